@@ -31,8 +31,8 @@ from harness.planning.form_choice import chosen_form
 from harness.scene import solution
 from harness.scene.solution import Solution, Source, solver_named
 from harness.series.session import Job, Result, SeriesSession
+from harness.solving.call_lock import in_turn
 from harness.solving.session import forces_of, form_of
-from harness.solving.turns import in_turn
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import opened
 from problems.errors import InputError
@@ -40,7 +40,7 @@ from problems.forms import FORMS, Form
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
-from problems.input.entries import SYMMETRY, contradictions
+from problems.input.matrix_entries import SYMMETRY, contradictions
 from problems.input.user_matrices import SMALL, checked
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases import random_gaps as random_fields

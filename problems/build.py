@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, TypeAlias
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress, silent
-from problems.forms.stages import DensePrepared, SparsePrepared
 from problems.model.effect import Effect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene

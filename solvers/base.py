@@ -30,7 +30,7 @@ from problems.forms import Form as Form
 from problems.forms.assembly import LoadCase as LoadCase
 from problems.forms.assembly import Vector
 from problems.forms.problem import Problem as Problem
-from problems.input.bounded import unknown
+from problems.input.bounded_types import unknown
 
 #: A solver's report on its own answer.
 Status = Literal["solved", "inaccurate", "iteration_limit", "failed"]

@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 from problems import __version__
 from problems.errors import InputError
-from problems.input.bounded import unknown
+from problems.input.bounded_types import unknown
 
 from .base import Solver, require
 from .plugin import load_plugin, own_files, solver_class

@@ -25,10 +25,10 @@ from harness.placement.search import Search, Step, onto
 from harness.placement.session import Outcome, PlanSession, Question, Study
 from problems.forms.assembly import Matrix
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import scene_of
+from problems.scene_files import scene_of
 from report.document.blocks import Section, Table, number, word
 from report.document.numbers import whole
-from report.writers.pages import written
+from report.writers.sections_writer import written
 
 CASES, SHARE, LIMIT = 60, 0.95, 1.5  # the limit: times what all candidates leave
 SCATTERS = {"smooth": (0.1, 200.0), "rough": (0.15, 70.0)}  # sd and correlation length, mm

@@ -31,7 +31,7 @@ from harness.results.schema import SERIES as SERIES_FILE
 from harness.results.schema import VERDICTS
 from harness.terminal import INTERRUPTED
 from report.results.reader import read
-from report.sections.roads import how_fast_table, in_series, ours_and_others
+from report.sections.time_to_solution import how_fast_table, in_series, ours_and_others
 from studies.paper.__main__ import write as write_study
 
 PUBLISHED = ROOT / "results" / "published"

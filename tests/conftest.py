@@ -27,14 +27,14 @@ def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished run of the tiny joint, two rows of the plug-in `exact`, which nobody may change."""
-    import tiny
-    from runs import said_by
+    import tiny_joint
+    from suite_runs import said_by
 
-    from harness.measurement.run import run
+    from harness.measurement.suite_run import run
     from harness.planning.suite import read_suite
 
     folder = tmp_path_factory.mktemp("finished")
-    suite = read_suite(str(tiny.write_suite(folder, tolerances=[1e-6, 1e-8])))
+    suite = read_suite(str(tiny_joint.write_suite(folder, tolerances=[1e-6, 1e-8])))
     assert said_by(run, suite, folder / "finished")[0] == 0
     return folder / "finished"
 

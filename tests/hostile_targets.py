@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-import tiny
+import tiny_joint
 from hostile_draws import OF_SUFFIX
-from long import Fault
-from runs import rows_of, said_by
-from small import make_load, make_prepared, solve_by_nnls
+from sample_size import Fault
+from small_problems import make_load, make_prepared, solve_by_nnls
+from suite_runs import rows_of, said_by
 from superelements import flat, stiffnesses, two_plates, write_part
 from synthetic_results import row, write_rows
 from test_hostile_input import SCENE
 from typer.testing import CliRunner
 
 from harness.cli.app import app
-from harness.measurement.run import run
+from harness.measurement.suite_run import run
 from harness.planning.suite import read_suite
 from harness.results.records import Row
 from harness.scene.export import matrices
@@ -141,7 +141,7 @@ def results(root: Path) -> Target:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(root / "cache"))
-        suite = read_suite(str(tiny.write_suite(folder, tolerances=[1e-6, 1e-8])))
+        suite = read_suite(str(tiny_joint.write_suite(folder, tolerances=[1e-6, 1e-8])))
         assert said_by(run, suite, folder / "done")[0] == 0
         assert invoke(folder, ("gate", "@done"))[0] == 0
     exact = {row["key"]: answer(folder, row) for row in rows_of(folder / "done")}
@@ -233,7 +233,7 @@ def superelements(root: Path) -> Target:
 def suite(root: Path) -> Target:
     """Read and refused: no scene has that name."""
     folder = root / "suite"
-    tiny.write_suite(folder, tolerances=[1e-6, 1e-8], gated=False)
+    tiny_joint.write_suite(folder, tolerances=[1e-6, 1e-8], gated=False)
     command = ("run", "@small.toml", "--scene", "nowhere", "--out", "@out")
     return Target("suite", 0.08, folder, ("small.toml",), (command,))
 

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from joints import make_joint
 from numpy.typing import NDArray
+from small_joints import make_joint
 
 from harness.scene.solution import Solution, solve
 from problems import formats
 from problems.build import prepared
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
-from problems.scene import scene_of
+from problems.scene_files import scene_of
 
 Array = NDArray[np.float64]
 Tables = dict[str, Any]

@@ -12,8 +12,8 @@ from .options import error_reporting, option
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from harness.results.sides import Side
-    from report.writers.comparison import Comparison
+    from harness.results.comparison import Side
+    from report.writers.comparison_report import Comparison
 
 MAX_SLOWDOWN = 1.3
 LINES = 20  # of a table
@@ -47,10 +47,10 @@ def compare(
     """
     with error_reporting() as console:
         from harness.results.atomic_output import refuse_unwritable
+        from harness.results.comparison import read_side
         from harness.results.records import MEASUREMENTS
-        from harness.results.sides import read_side
         from harness.terminal import DONE, FAILED
-        from report.writers.comparison import write
+        from report.writers.comparison_report import write
 
         if out:
             refuse_unwritable(out, [Path(name) / MEASUREMENTS for name in (old, *new)])
@@ -66,11 +66,11 @@ def compare(
 def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float | None) -> Comparison:
     import pandas as pd
 
-    from harness.results.sides import Incomparable, measurement, refuse_incomparable
+    from harness.results.comparison import Incomparable, measurement, refuse_incomparable
     from report.analysis.comparison import compared
     from report.document.escape import quoted
     from report.results.rows import of_records
-    from report.writers.comparison import Comparison
+    from report.writers.comparison_report import Comparison
 
     refuse_incomparable(old, new)
     timed = len(old.machines | new.machines) == 1
@@ -94,7 +94,7 @@ def _show(comparison: Comparison, console: Console) -> None:
     from report.analysis.comparison import ADDED, BETTER, SAME, WORSE
     from report.document.blocks import records
     from report.document.escape import plain
-    from report.writers.comparison import COLUMNS
+    from report.writers.comparison_report import COLUMNS
 
     columns = [column for column in COLUMNS if column.heading not in LEFT_OUT]
     changed = comparison.table[~comparison.table["group"].isin([ADDED, SAME])]

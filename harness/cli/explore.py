@@ -40,12 +40,12 @@ def explore(
             allowed = f"needs Bokeh: pip install 'rivetbench[explore]' ({error})"
             raise InputError.one("explore", "bokeh", "not installed", allowed) from error
 
-        from harness.explore.answers import Explorer, Settings
+        from harness.explore.live_answers import Explorer, Settings
         from harness.planning.form_choice import chosen_form
         from harness.scene.allowed_gap import refuse_unusable
         from problems.forms import FORMS
         from problems.model.scene import JointScene
-        from problems.scene import read_scene
+        from problems.scene_files import read_scene
 
         refuse_unusable(allow_gap)
         read = read_scene(scene)

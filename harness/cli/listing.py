@@ -6,10 +6,10 @@ from rich.table import Table
 
 from harness.planning.suite import read_suite, suite_names
 from problems import formats
-from problems.drawn import SIZES
 from problems.errors import InputError
 from problems.ladders import PREFIXES, rung_names
-from problems.scene import read_scene, scene_names
+from problems.random_scenes import SIZES
+from problems.scene_files import read_scene, scene_names
 from solvers.registry import make_solver, modules, solver_names, solver_version
 
 

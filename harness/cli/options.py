@@ -72,7 +72,7 @@ def error_reporting(
     interrupted: str = "Interrupted. The rows so far are kept: run the same command again to continue.",
 ) -> Iterator[Console]:
     """A console; each user error becomes a red line and an exit code, not a traceback."""
-    from harness.results.sides import Incomparable
+    from harness.results.comparison import Incomparable
     from harness.terminal.console import PlainConsole
     from problems.errors import InputError
 

@@ -60,22 +60,22 @@ def place(
     with error_reporting(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
-        from harness.measurement.describe import described
+        from harness.measurement.solver_descriptions import described
         from harness.placement.candidates import Movable
-        from harness.placement.fresh import Goal
+        from harness.placement.fresh_cases import Goal
         from harness.placement.run import OUTPUTS, run
         from harness.placement.session import Study
         from harness.planning.form_choice import chosen_form
         from harness.results.atomic_output import refuse_inputs
         from harness.scene.allowed_gap import refuse_unusable
         from harness.scene.validate import print_unusual
-        from harness.series.given import RANDOM, GivenCases
+        from harness.series.load_case_source import RANDOM, GivenCases
         from harness.terminal.console import waiting
         from problems.build import load_case
         from problems.effects.initial_gap import InitialGap
         from problems.errors import Fault, InputError
         from problems.load_cases import Listed
-        from problems.scene import read_scene
+        from problems.scene_files import read_scene
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         refuse_unusable(allow_gap)

@@ -94,22 +94,22 @@ def series(
                 3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with error_reporting() as console:
-        from harness.measurement.describe import described
         from harness.measurement.scheduler import threads_per_worker
+        from harness.measurement.solver_descriptions import described
         from harness.planning.form_choice import chosen_form
         from harness.results.atomic_output import refuse_inputs, refuse_unwritable
         from harness.results.schema import SERIES
         from harness.results.series_file import read_facts
         from harness.scene.allowed_gap import refuse_unusable, show_series
         from harness.scene.validate import print_unusual
-        from harness.series.given import RANDOM, GivenCases
+        from harness.series.load_case_source import RANDOM, GivenCases
         from harness.series.run import run
         from harness.series.session import Job
         from harness.terminal import DONE, NOTHING_JUDGED
         from harness.terminal.console import waiting
         from problems.errors import Fault, InputError
         from problems.load_cases.sweep import sweep as swept
-        from problems.scene import read_scene
+        from problems.scene_files import read_scene
 
         refuse_unusable(allow_gap)
         given = GivenCases(cases, seed, mean, sd, correlation_length, around, gaps)
@@ -145,7 +145,7 @@ def series(
         facts = {"solver_version": made.version, "solver_code": made.code}
         code = run(job, facts, out, console, scheduler)
         if read_facts(out):
-            from report.writers.series import write  # slow to import: not before the first row
+            from report.writers.series_report import write  # slow to import: not before the first row
 
             console.print(f"Report: {write(out)}")
         if code in (DONE, NOTHING_JUDGED) and allow_gap is not None:

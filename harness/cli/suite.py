@@ -87,8 +87,8 @@ def run(
                 3 nothing could be judged, 130 interrupted.
     """
     with error_reporting() as console:
-        from harness.measurement.run import run as run_suite
         from harness.measurement.scheduler import threads_per_worker
+        from harness.measurement.suite_run import run as run_suite
         from harness.planning.overrides import Overrides, overridden, tolerances_of
         from harness.planning.suite import read_suite, read_written
         from harness.results.atomic_output import refuse_inputs
@@ -122,7 +122,7 @@ def run(
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         code = run_suite(chosen, directory, console, scheduler, key)
         if (directory / MEASUREMENTS).is_file():
-            from report.writers.markdown import write  # slow to import: not before the first row
+            from report.writers.suite_report import write  # slow to import: not before the first row
 
             console.print(f"Report: {write(directory)}")
         raise typer.Exit(code)
@@ -141,7 +141,7 @@ def report(
         from harness.planning.suite import read_written
         from harness.results import records
         from harness.results.atomic_output import refuse_unwritable
-        from harness.results.kinds import refuse_unreadable
+        from harness.results.row_validation import refuse_unreadable
         from harness.results.schema import SERIES
         from harness.results.series_file import refuse_damaged
         from problems.errors import InputError
@@ -149,7 +149,7 @@ def report(
         if directory.is_dir():
             refuse_unwritable(directory / "report", (), "DIR")
         if (directory / SERIES).exists():
-            from report.writers.series import write as write_series
+            from report.writers.series_report import write as write_series
 
             refuse_damaged(directory)
             console.print(f"Report: {write_series(directory)}")
@@ -161,7 +161,7 @@ def report(
         suite = directory / "suite.toml"
         if suite.is_file():
             read_written(suite)
-        from report.writers.markdown import write
+        from report.writers.suite_report import write
 
         console.print(f"Report: {write(directory)}")
 

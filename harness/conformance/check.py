@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.solving.answers import InvalidAnswer, checked, error_text, shown, vector
 from harness.solving.session import SolverSession
+from harness.solving.solver_answer import InvalidAnswer, checked, error_text, shown, vector
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form

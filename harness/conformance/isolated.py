@@ -8,9 +8,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from harness.measurement.child import Events
-from harness.measurement.describe import IMPORT_S, refuse_unimportable
-from harness.measurement.monitored import Monitored
+from harness.measurement.child_process import Events
+from harness.measurement.monitored_call import Monitored
+from harness.measurement.solver_descriptions import IMPORT_S, refuse_unimportable
 from harness.terminal import DONE, FAILED
 from harness.terminal.console import waiting
 from problems.errors import InputError

@@ -24,15 +24,15 @@ from bokeh.models.tools import PointDrawTool
 from bokeh.plotting import figure
 from bokeh.server.server import Server
 
-from harness.explore.answers import CHANGED, Answer, Explorer, Settings
+from harness.explore.live_answers import CHANGED, Answer, Explorer, Settings
 from harness.explore.raster import Raster
 from harness.results.records import replace_text
-from harness.scene.edited import edited
+from harness.scene.scene_file import edited
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
-from problems.scene import scene_of
+from problems.scene_files import scene_of
 from report.document.numbers import position
 
 NOTHING = "rgba(0, 0, 0, 0)"

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from rich.console import Console
 
-from harness.measurement.monitored import TRIM
+from harness.measurement.monitored_call import TRIM
 from harness.results.provenance import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
 from problems.storage import ROOT, fingerprint

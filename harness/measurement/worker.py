@@ -20,19 +20,19 @@ from scipy.linalg import lapack
 from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, resident_mib
 from harness.results.records import Row
-from harness.solving.answers import InvalidAnswer, StoredFiles, figures, save
 from harness.solving.session import SolverSession
+from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures, save
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
 from problems.model.scene import Scene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .child import Events
+from .child_process import Events
 from .environments import interpreter
-from .monitored import Monitored
+from .monitored_call import Monitored
 
 START_S = 300.0  # for the imports and opening the data
 SAVE_S = 60.0  # for saving the answer

@@ -19,14 +19,14 @@ import pandas as pd
 from rich.console import Console
 
 from harness.measurement.scheduler import workers
-from harness.placement.asked import PLANS, Asked
+from harness.placement.answer_journal import PLANS, Asked
 from harness.placement.candidates import Movable, Plan
-from harness.placement.fresh import CONFIDENCE, Cases, Found, Goal, Sample, decided
+from harness.placement.fresh_cases import CONFIDENCE, Cases, Found, Goal, Sample, decided
 from harness.placement.search import Search, Step
 from harness.placement.session import THREADS, Study
 from harness.results import records
 from harness.results.provenance import installed_version, provenance
-from harness.scene.edited import MOVED, edited, with_fasteners, with_gaps
+from harness.scene.scene_file import MOVED, edited, with_fasteners, with_gaps
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from harness.terminal import DONE, GAP_EXCEEDED
@@ -40,7 +40,7 @@ from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
 from problems.model.scene import JointScene, Scene
-from problems.scene import read_scene, scene_of
+from problems.scene_files import read_scene, scene_of
 from problems.storage import digest
 from report.document.numbers import counted, position
 
@@ -120,7 +120,7 @@ def run(
         words, code = _said(found, goal, nodes)
         record = _record(study, movable, candidates, goal, found, nodes)
         records.replace_object(directory / RECORD, record | {"said": words})
-        from report.writers.place import write  # slow to import: not before the search
+        from report.writers.place_report import write  # slow to import: not before the search
 
         console.print(f"Report: {write(directory)}")
         console.print(words, style="green" if code == DONE else "red", soft_wrap=True)

@@ -1,7 +1,7 @@
 """The fewest fasteners that keep a gap, or the best of a number: removal one by one, then exchange.
 
 The gap G(S) of a plan S is the least that all load cases but the worst keep, as many as may fail of K (see
-fresh.py). It is not monotone: a fastener may open a gap elsewhere. Plans are compared by
+fresh_cases.py). It is not monotone: a fastener may open a gap elsewhere. Plans are compared by
 
     φ(S) = (max(G, limit), mean over the cases of (Σ y⁸ / m)^⅛),
 

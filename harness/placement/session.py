@@ -19,7 +19,7 @@ import numpy as np
 import threadpoolctl
 
 from harness.placement.candidates import Place, Plan
-from harness.solving.turns import in_turn
+from harness.solving.call_lock import in_turn
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
@@ -29,7 +29,7 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
 from problems.model.scene import JointScene
-from solvers.algorithms.sweeps import Case, Sweeps
+from solvers.algorithms.newton_sweeps import Case, Sweeps
 from solvers.kkt import with_p
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre

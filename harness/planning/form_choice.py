@@ -22,7 +22,7 @@ from problems.input.user_matrices import SMALL, holds_sparse, stored_matrices
 from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
-from problems.stiffness.dense import dense_slices
+from problems.stiffness.dense_block import dense_slices
 
 SMALL_MIB = 100.0  # of dense matrices, per load case
 MIB = 2**20

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from problems.errors import Fault, InputError
-from problems.input.bounded import resolved, unknown
-from problems.scene import read_scene
+from problems.input.bounded_types import resolved, unknown
+from problems.scene_files import read_scene
 from solvers.base import Form
 from solvers.registry import modules
 

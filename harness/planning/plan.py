@@ -14,7 +14,7 @@ from typing import Any
 
 from problems.errors import Fault, InputError
 from problems.model.scene import Scene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from solvers.base import FORMS, Form
 
 from .suite import RandomCases, SolverEntry, Suite
@@ -29,8 +29,8 @@ class Measurement:
     """One solver on one scene in one form: what one process will do.
 
     scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
-    searched, paced : it may turn out to need no measuring (due.py).
-    stop : why its time limit is tighter than the suite's, or "" (due.py).
+    searched, paced : it may turn out to need no measuring (tolerance_search.py).
+    stop : why its time limit is tighter than the suite's, or "" (tolerance_search.py).
     requirements : what its environment has in other versions than this one.
     """
 

@@ -29,9 +29,8 @@ from pydantic import (
     ValidationError,
 )
 
-from problems.drawn import EXAMPLES, drawn_names
 from problems.errors import Fault, InputError
-from problems.input.bounded import (
+from problems.input.bounded_types import (
     VALUE,
     WORD,
     Finite,
@@ -43,7 +42,8 @@ from problems.input.bounded import (
     validation_faults,
 )
 from problems.ladders import prefix_of, rung_names
-from problems.scene import read_toml, scene_names
+from problems.random_scenes import EXAMPLES, drawn_names
+from problems.scene_files import read_toml, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names
 
@@ -72,8 +72,8 @@ class SolverEntry(BaseModel):
 
     The default of `forms` is the dual, or the primal if the solver takes no other. `threads` and `cases`
     override the suite's. "auto" as tolerances searches for the loosest decade that reaches the limit on each
-    scene, as repeats it repeats what is quick (see due.py). batched : load cases of a series solved at
-    once, by the solver's `batched`. with = ["piqp==0.6.2"] measures it in an environment that has this
+    scene, as repeats it repeats what is quick (tolerance_search.py). batched : load cases of a series solved
+    at once, by the solver's `batched`. with = ["piqp==0.6.2"] measures it in an environment that has this
     version of its library, and what else is listed.
     """
 
@@ -126,7 +126,8 @@ class Suite(BaseModel):
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
-    stop_at_times_fastest stops what takes that many times as long as the fastest library (due.py).
+    stop_at_times_fastest stops what takes that many times as long as the fastest library
+    (tolerance_search.py).
     after reference_limit_s no further method is tried for a reference; by default 60 s per thousand
     contacts, at least 60.
     """

@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from problems.input.bounded import MIB
+from problems.input.bounded_types import MIB
 
 from . import records
 

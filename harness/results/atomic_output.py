@@ -12,7 +12,7 @@ from typing import Any
 
 from harness.results.records import replace_text, to_line
 from problems.errors import InputError
-from problems.input.bounded import resolved
+from problems.input.bounded_types import resolved
 
 RECORD = "solution.json"  # of an answer
 

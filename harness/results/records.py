@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.errors import Fault, InputError
-from problems.input.bounded import regular_file
+from problems.input.bounded_types import regular_file
 
 from .schema import CRC, SERIES
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, InstanceOf, ValidationError
 
 from problems.errors import InputError
-from problems.input.bounded import Positive, regular_file, validation_faults
+from problems.input.bounded_types import Positive, regular_file, validation_faults
 
 from . import records
 from .records import Row, to_line

@@ -24,7 +24,7 @@ from report.document.numbers import position
 if TYPE_CHECKING:
     import pandas as pd
 
-    from report.results.series import Series
+    from report.results.series_results import Series
 
 CONFIDENCE = 0.95  # of the interval of Clopper and Pearson for a share
 ROUNDING = 2.0**-24
@@ -83,7 +83,7 @@ def show_series(directory: Path, allowed_mm: float, console: Console) -> int:
     """Print the outcome for a series, write DIRECTORY/allowed-gap.csv and .png; returns the exit code."""
     from scipy.stats import binomtest  # slow to import, as is the report: not before the first row
 
-    from report.results.series import read
+    from report.results.series_results import read
 
     series = read(directory)
     if not len(series.cases):
@@ -182,7 +182,7 @@ def write(directory: Path, series: Series, found: Exceeding) -> Path:
     from matplotlib.colors import Normalize
 
     from report.figures import style
-    from report.figures.maps import Map, Scale, drawn
+    from report.figures.junction_maps import Map, Scale, drawn
 
     table = pd.DataFrame({"share_of_cases": found.shares, "largest_gap_mm": found.largest})
     if series.nodes is not None:

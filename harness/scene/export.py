@@ -36,7 +36,7 @@ from problems.forms.problem import in_form
 from problems.input import matrix_files
 from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import Scene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 from .validate import digits_sentence, print_facts
 
@@ -133,7 +133,7 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
     path.mkdir()
     for name, M in arrays.items():
         matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
-        formats.text.write_one(path / f"{name}.mtx", matrix, "general")
+        formats.matrix_text.write_one(path / f"{name}.mtx", matrix, "general")
     (path / "about.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")
 
 

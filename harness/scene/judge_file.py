@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from harness.results.sides import Incomparable
+from harness.results.comparison import Incomparable
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from harness.verification.judge import Judgement
@@ -18,7 +18,7 @@ from harness.verification.reference_problem import ReferenceProblem, reference_p
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Vector
-from problems.input.bounded import regular_file
+from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import damage
 from problems.input.tables import Cells, doubt, is_stray, number
 from report.document.numbers import position

@@ -22,7 +22,7 @@ from problems.forms import FORMS, Form
 from problems.forms.assembly import Vector
 from problems.forms.problem import Progress
 from problems.model.scene import Scene
-from problems.scene import read_scene, scene_of
+from problems.scene_files import read_scene, scene_of
 from solvers.base import Answer, Solver
 
 LINEAR = "linear solve with the Cholesky factors of K"

@@ -38,7 +38,7 @@ from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.positions import FORCES
 from problems.model.scene import JointScene, MatricesScene, Scene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 from . import allowed_gap, grid_error, solution
 from .solution import Solution
@@ -102,7 +102,7 @@ def solve(
     if allow_gap_mm is not None:
         code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
     with console.status(Text("pictures and files")), atomic_output(out, scene.sources) as new:
-        from report.writers.solution import write  # slow to import: not before the answer is shown
+        from report.writers.answer_report import write  # slow to import: not before the answer is shown
 
         new.mkdir()
         np.savez(new / "solution.npz", **_arrays(found))

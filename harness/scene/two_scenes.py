@@ -9,11 +9,11 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from harness.results.sides import Incomparable
+from harness.results.comparison import Incomparable
 from harness.terminal import FAILED
 from problems.build import prepared
 from problems.model.scene import JointScene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 FOLDERS = ["first", "second"]
 
@@ -33,7 +33,7 @@ def solve_both(
         console.print(source, style="bold")
         codes.append(solve(source, out / folder))
     from report.document.escape import plain
-    from report.writers.two_answers import write
+    from report.writers.two_answers_report import write
 
     path, pairs = write(out, FOLDERS)
     console.print(Text(f"{sources[0]} and {sources[1]}", style="bold"))

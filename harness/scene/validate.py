@@ -24,7 +24,7 @@ from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 
 def validate(source: str, console: Console) -> None:

@@ -27,7 +27,7 @@ from problems.load_cases import LoadCases
 from problems.model.scene import JointScene
 from report.document.numbers import counted
 
-from .places import results_of
+from .executors import results_of
 from .session import Job, Result
 
 MAX_FAULTS = 10  # named at once

@@ -17,10 +17,10 @@ from problems.forms import Form, default_form
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
-from problems.forms.units import Units
+from problems.forms.solver_units import Units
 from solvers.base import Answer, Batch, Solver, WarmStart
 
-from .answers import InvalidAnswer, checked
+from .solver_answer import InvalidAnswer, checked
 
 NO_ANSWER = "gave no answer; try another solver or form"
 NO_CONTACT = "no contact closes"
@@ -45,7 +45,7 @@ class Solved:
 class SolverSession:
     """Convert and prepare once, then solve load cases one by one; answers are kept for warm starts.
 
-    The solver is given the problem in the units of problems/forms/units.py, chosen anew by `cold`.
+    The solver is given the problem in the units of problems/forms/solver_units.py, chosen anew by `cold`.
 
     Parameters
     ----------

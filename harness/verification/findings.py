@@ -3,7 +3,7 @@
 The errors of an earlier run are a standard that the gate holds later ones to. A finding is worse than that
 baseline if
 
-    error > margin · max(error then, floor),    floor: harness/results/sides.py
+    error > margin · max(error then, floor),    floor: harness/results/comparison.py
 
 so that 1e-11 mm becoming 9e-8 mm is news, although both are within the limit. The errors of the baseline are
 those in its rows; its answers need not have been kept.
@@ -17,8 +17,8 @@ from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
 
+from harness.results.comparison import Side, floor_mm, measurement, read_side, refuse_incomparable
 from harness.results.records import Row, replace_text, to_line
-from harness.results.sides import Side, floor_mm, measurement, read_side, refuse_incomparable
 from harness.terminal.console import legible
 
 from .judge import Judgement

@@ -17,13 +17,13 @@ from harness.planning.suite import RandomCases, read_written
 from harness.results import records
 from harness.results.answer_files import is_kept
 from harness.results.atomic_output import refuse_outputs
-from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
+from harness.results.row_validation import refuse_wrong_kinds
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from problems.errors import Fault, InputError
 from problems.forms import form_family
-from problems.input.bounded import validation_faults
+from problems.input.bounded_types import validation_faults
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement

@@ -35,9 +35,9 @@ from problems.forms.assembly import LoadCase, Mask, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.stiffness import gamma
 
-from .balanced import Balanced
+from .balanced_units import Balanced
+from .closed_contacts import ClosedContacts, Near
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
-from .near import ClosedContacts, Near
 
 MAX_PASSES = 30
 MAX_WORSE = 2  # passes in a row that do not halve the bound

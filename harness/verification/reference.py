@@ -21,7 +21,7 @@ from problems.forms.prepared import Prepared
 from problems.model.scene import ManufacturedScene, Scene
 from problems.storage import fingerprint
 
-from .balanced import smallest_eigenvalue
+from .balanced_units import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
 from .proof import Proof, Proven
 

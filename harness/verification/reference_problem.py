@@ -20,7 +20,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
 from problems.model.scene import JointScene, Scene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 from .judge import Judgement, Reference, conditioned_limit, judge
 from .reference import Candidate, default_limit_s, reference, reference_of

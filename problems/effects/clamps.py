@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.bounded import Positive
+from problems.input.bounded_types import Positive
 from problems.model.effect import Pair, pressing_forces, sides
 from problems.model.interface import AnyJoint
 from problems.model.positions import Positions

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.bounded import Finite, Positive, Seed
+from problems.input.bounded_types import Finite, Positive, Seed
 from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
 from problems.model.interface import AnyJoint, Pair
 from problems.model.joint import Faults, Table

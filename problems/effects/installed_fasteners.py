@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
-from problems.input.bounded import Finite, Positive
+from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import Effect, Pair, SpringEffect, sides
 from problems.model.interface import AnyJoint, across
 from problems.model.joint import TOOL, Faults

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import scipy.sparse as sp
 
-from problems.input.bounded import Finite, Positive
+from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.bounded import Finite
+from problems.input.bounded_types import Finite
 from problems.input.scan_points import crowded, too_small, unlike
 from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
 from problems.model.interface import AnyJoint

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.input.bounded import Finite
+from problems.input.bounded_types import Finite
 from problems.model.effect import ForceEffect, PartEffect
 from problems.model.interface import AnyJoint
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import scipy.sparse as sp
 from pydantic import Field
 
-from problems.input.bounded import Finite, NotNegative, Positive
+from problems.input.bounded_types import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
 from problems.model.joint import Faults
 from problems.model.plate import Plate

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.input.bounded import Finite
+from problems.input.bounded_types import Finite
 from problems.model.effect import Effect, GapEffect, Pair, PartEffect, at_contacts
 from problems.model.interface import AnyJoint
 from problems.model.joint import TOOL, Faults

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded import Finite, Positive
+from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import ContactEffect, Effect, GapEffect, Pair, at_contacts
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults

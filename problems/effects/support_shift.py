@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from problems.forms.assembly import Vector
-from problems.input.bounded import Finite
+from problems.input.bounded_types import Finite
 from problems.model.effect import Effect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults

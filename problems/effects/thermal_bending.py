@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.input.bounded import Finite, Positive
+from problems.input.bounded_types import Finite, Positive
 from problems.model.part import PartLoadEffect, PartModel
 
 

@@ -13,11 +13,11 @@ import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input import matrix_files
-from problems.input.entries import refuse_no_stiffness, refuse_twice
+from problems.input.matrix_entries import refuse_no_stiffness, refuse_twice
 from problems.input.matrix_files import Choose
 from problems.input.user_matrices import NAMES, SMALL
 
-from . import dmig, nastran, text
+from . import dmig, matrix_text, nastran
 
 Data = dict[str, Any]
 Labels = np.ndarray | None
@@ -65,9 +65,9 @@ FORMATS = {
     "abaqus": Format(
         "a folder: K as Abaqus matrix text, the others as Matrix Market, bit for bit",
         (".mtx",),
-        text.write_abaqus,
-        text.read_abaqus,
-        lambda path: not text.is_matrix_market(path),
+        matrix_text.write_abaqus,
+        matrix_text.read_abaqus,
+        lambda path: not matrix_text.is_matrix_market(path),
     ),
     "dmig": Format(
         "a file .pch (Nastran DMIG), 10 digits",
@@ -80,9 +80,9 @@ FORMATS = {
     "mtx": Format(
         "a folder of Matrix Market files, bit for bit",
         (".mtx",),
-        text.write_matrix_market,
-        text.read_matrix_market,
-        text.is_matrix_market,
+        matrix_text.write_matrix_market,
+        matrix_text.read_matrix_market,
+        matrix_text.is_matrix_market,
     ),
     "npz": Format("a file .npz, bit for bit", (".npz",), _write_npz, _read_npz),
     "op4": Format(

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.input.entries import from_entries
+from problems.input.matrix_entries import from_entries
 from problems.input.matrix_files import MIB, Choose
 from problems.input.text_files import read_text
 

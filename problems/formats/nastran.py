@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.input.entries import mirrored, one_sided
+from problems.input.matrix_entries import mirrored, one_sided
 from problems.input.matrix_files import MIB, Choose
 from problems.input.text_files import WIDE, read_bytes
 

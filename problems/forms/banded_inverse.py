@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import blas, lapack
 
-from problems.stiffness.band import band_cholesky
+from problems.stiffness.band_factor import band_cholesky
 
 from .assembly import Indices, Mask, Matrix, Vector
 

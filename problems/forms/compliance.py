@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from problems.stiffness.dense import product
+from problems.stiffness.dense_block import product
 from problems.stiffness.operator import Stiffness
 
 from .assembly import Assembly, Indices, Matrix, Vector

@@ -163,7 +163,7 @@ class _Scaled(Prepared):
 
 def dual_alone(Q: Matrix) -> Prepared:
     """Q (m, m) mm/N without a joint: the dual program of K = Q⁻¹ and A = I, for p = −g (see `load_of`)."""
-    from problems.stiffness.dense import InverseBlock  # of this only
+    from problems.stiffness.dense_block import InverseBlock  # of this only
 
     return Prepared(Assembly(Stiffness([InverseBlock(Q)]), sp.eye_array(len(Q), format="csc")), Q=lambda: Q)
 

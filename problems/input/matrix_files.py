@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 
-from .entries import from_entries, read_entries, refuse_twice
+from .matrix_entries import from_entries, read_entries, refuse_twice
 from .text_files import read_bytes
 
 PARTS = ("data", "indices", "indptr", "shape")

@@ -26,7 +26,7 @@ from pathlib import Path
 
 from problems.errors import Fault, InputError
 
-from .bounded import LARGEST
+from .bounded_types import LARGEST
 from .text_files import read_text
 
 CSV_MIB = 100

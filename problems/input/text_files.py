@@ -15,7 +15,7 @@ from pathlib import Path
 
 from problems.errors import InputError
 
-from .bounded import MIB, regular_file
+from .bounded_types import MIB, regular_file
 
 FOREIGN = "cp1252"
 WIDE = {

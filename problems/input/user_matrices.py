@@ -17,14 +17,14 @@ from problems import storage
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.stiffness.block import NotPositiveDefinite
-from problems.stiffness.dense import dense_blocks
+from problems.stiffness.dense_block import dense_blocks
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.sparse import sparse_block
+from problems.stiffness.sparse_block import sparse_block
 from problems.storage import fingerprint
 
 from . import matrix_files
-from .bounded import LARGEST
-from .entries import refuse_no_stiffness
+from .bounded_types import LARGEST
+from .matrix_entries import refuse_no_stiffness
 
 NAMES = ("K", "A", "f", "g", "nodes")
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow

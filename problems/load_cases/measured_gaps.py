@@ -12,7 +12,7 @@ from problems.build import load_case
 from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.input.bounded import regular_file
+from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import damage
 from problems.input.scan_points import neighbours, outliers
 from problems.model.effect import GapEffect

@@ -13,14 +13,14 @@ from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix
-from problems.input.bounded import validation_faults
+from problems.input.bounded_types import validation_faults
 from problems.model.effect import at_contacts
 from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
 from . import LoadCases
-from .scan import Scan, read_scan
+from .gaps_through_scan import Scan, read_scan
 
 #: The bits of a case's seed: integers of this size are exact in every JSON reader.
 SEED_BITS = 53

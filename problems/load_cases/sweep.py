@@ -13,7 +13,7 @@ from problems.build import load_case
 from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase
-from problems.input.bounded import validation_faults
+from problems.input.bounded_types import validation_faults
 from problems.model.effect import SpringEffect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest

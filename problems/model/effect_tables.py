@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from problems.errors import Fault
-from problems.input.bounded import unknown, validation_faults
+from problems.input.bounded_types import unknown, validation_faults
 from problems.input.tables import Rows, read_columns
 
 from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part

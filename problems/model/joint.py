@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded import Name, Positive
+from problems.input.bounded_types import Name, Positive
 
 from .plate import Plate
 from .surface import Grid

@@ -19,16 +19,16 @@ import scipy.sparse as sp
 
 from problems import storage
 from problems.forms.assembly import Assembly, Indices, LoadCase
+from problems.forms.preparation_stages import DensePrepared, SparsePrepared, indefinite
 from problems.forms.problem import Progress, silent
-from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.sparse import sparse_block
+from problems.stiffness.sparse_block import sparse_block
 from problems.storage import fingerprint
 
+from .banded_numbering import Numbering
 from .effect import Effect, junction_load
 from .joint import Joint
-from .numbering import Numbering
 from .part import PartLoadEffect, PartModel, graded
 from .scene import JointScene
 from .springs import Springs
@@ -65,7 +65,7 @@ class JointModel:
     @property
     def built(self) -> bool:
         """Whether every dense matrix is in the cache; computes nothing."""
-        from .condense import part_key  # of the dense forms only
+        from .condensation import part_key  # of the dense forms only
 
         known = [*map(part_key, self.parts)]
         if self.springs:
@@ -85,7 +85,7 @@ class JointModel:
                 place, force = self.numbering.places[k], load.load(self.parts[k])
                 f[place[place >= 0]] += force[place >= 0]
             else:
-                from .condense import condensed_load  # of the dense forms only
+                from .condensation import condensed_load  # of the dense forms only
 
                 own = condensed_load(load, self.parts[k], partial(self.interior, k))
                 f[joint.unknowns(load.part)] += own
@@ -184,7 +184,7 @@ class JointModel:
         """K and A, memory-mapped from the cache or computed now: a dense block of K for each part, or for
         parts from the first to the last that springs join. Raises InputError as `sparse` does.
         """
-        from .condense import condensed_stiffness, part_key  # of the dense forms only
+        from .condensation import condensed_stiffness, part_key  # of the dense forms only
 
         joint, source_of = self.joint, self.scene.source_of
         blocks, seconds, keys = [], {}, [*map(part_key, self.parts)]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.bounded import Finite, NotNegative
+from problems.input.bounded_types import Finite, NotNegative
 from problems.input.scan_points import crowded
 
 from .effect import ContactEffect, Effect, ForceEffect, SpringEffect

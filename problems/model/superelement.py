@@ -26,12 +26,12 @@ from problems.errors import InputError
 from problems.formats import DENSEST, read_stiffness
 from problems.forms.assembly import Indices, Matrix
 from problems.input import matrix_files
-from problems.input.bounded import Name, regular_file
+from problems.input.bounded_types import Name, regular_file
 from problems.input.user_matrices import SMALL, checked
 from problems.storage import fingerprint
 
 from .joint import Table
-from .nodes import Nodes, listed, read_nodes
+from .node_table import Nodes, listed, read_nodes
 from .superelement_rows import Order, rows_of
 
 MIB = 16_384

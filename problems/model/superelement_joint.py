@@ -25,12 +25,12 @@ from pydantic import Field
 
 from problems.errors import InputError
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded import Positive
+from problems.input.bounded_types import Positive
 
+from .contact_pairing import Face, Pairing, paired, with_tool
 from .interface import across
 from .joint import TOOL, Faults, Pair, Table, wrong_contacts
-from .nodes import listed, outliers
-from .pairing import Face, Pairing, paired, with_tool
+from .node_table import listed, outliers
 from .plate import Plate
 from .superelement import Superelement, SuperelementTable
 from .superelement_rows import misfit

@@ -23,8 +23,8 @@ from problems import storage
 from problems.errors import Fault, InputError
 from problems.formats import DENSEST
 from problems.forms.assembly import Assembly, LoadCase, Matrix
+from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.forms.problem import Progress, silent
-from problems.forms.stages import DensePrepared, SparsePrepared
 from problems.input.user_matrices import SMALL, refuse_dependent
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from problems.errors import InputError
 from problems.forms.assembly import Indices
 
-from .nodes import Nodes, listed
+from .node_table import Nodes, listed
 
 Order = Literal["table", "ids", "directions"]
 Rows = tuple[Indices, Indices]

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
-from .cells import cells_of, cross, means, wachspress
+from .surface_cells import cells_of, cross, means, wachspress
 
 SAME = 1e-6  # mm: closer points are one
 THIN = 1e-6  # of its length: a narrower strip of nodes is a line

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from . import Indices, Matrix, Vector, balanced_units
 from .block import Block, NotPositiveDefinite, scaled
-from .dense import DenseBlock, dense_blocks, mirrored
+from .dense_block import DenseBlock, dense_blocks, mirrored
 from .selected_inverse import BlockPart
-from .sparse import sparse_block
+from .sparse_block import sparse_block
 
 POWER_STEPS = 5
 

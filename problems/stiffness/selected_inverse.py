@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
 from . import Indices, Matrix
-from .band import Entries, band_blocks
+from .band_factor import Entries, band_blocks
 
 UNBLOCKED = 64  # LAPACK's inverse of a triangle is slower than products beyond that
 FURTHEST = 20  # half-bandwidths between the contacts of a window

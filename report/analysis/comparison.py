@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.results.comparison import digits_lost, floor_mm
 from harness.results.schema import VERDICTS
-from harness.results.sides import digits_lost, floor_mm
 from report.results.rows import cells_of
 
 from .standings import TIE

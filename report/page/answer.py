@@ -6,8 +6,8 @@ import pandas as pd
 
 from report.document.numbers import listed, position, significant
 from report.page.write import Data, banner
-from report.results.answers import Answer, fasteners, pair_name
-from report.results.series import Array
+from report.results.answer_record import Answer, fasteners, pair_name
+from report.results.series_results import Array
 
 from .maps import answer_maps, two_answers_maps
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from report.page.write import Data, exact, packed
-from report.results.answers import pair_name
+from report.results.answer_record import pair_name
 from report.results.reader import Results
-from report.results.series import Array, Series
+from report.results.series_results import Array, Series
 
 NO_MARKS = np.zeros((0, 2))
 BUDGET = 1_100_000  # characters of all maps of a page

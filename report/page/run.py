@@ -17,7 +17,7 @@ import pandas as pd
 
 from harness.results.schema import LADDERS
 from report.analysis.checks import warnings
-from report.analysis.roads import STAGES, roads
+from report.analysis.time_to_solution import STAGES, roads
 from report.document.blocks import records
 from report.document.numbers import listed
 from report.figures.style import line_styles

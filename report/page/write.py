@@ -14,7 +14,7 @@ import pandas as pd
 
 from report.analysis.checks import commits_text
 from report.document.escape import plain, quoted, script_json, short
-from report.results.series import Array
+from report.results.series_results import Array
 
 HERE = Path(__file__).parent
 SCRIPTS = ("state", "judge", "matrix", "details", "plots", "maps", "page")

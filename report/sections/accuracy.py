@@ -20,7 +20,7 @@ from report.analysis.standings import (
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.figures import style
-from report.figures.lines import styles_of
+from report.figures.line_charts import styles_of
 from report.results.reader import Results
 from report.results.rows import in_order, named
 

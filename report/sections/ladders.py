@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from harness.results.schema import LADDERS, OWNERS
 from report.document.blocks import Block, Figure, Section, Table, Text, number, records, word
 from report.document.numbers import as_number, counted, power, whole
-from report.figures.lines import Cell, Group, grid
+from report.figures.line_charts import Cell, Group, grid
 from report.figures.style import BLUE, VERMILLION
 from report.results.reader import Results
 from report.results.rows import in_order

@@ -8,12 +8,12 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.roads import exponent
 from report.analysis.standings import best_tolerances, seconds_text, shown, spreads
+from report.analysis.time_to_solution import exponent
 from report.document.blocks import Column, Figure, Section, Table, number, records, word
 from report.document.numbers import spread, whole
 from report.figures import style
-from report.figures.lines import MARKS, against_contacts, entries, styles_of, yardstick
+from report.figures.line_charts import MARKS, against_contacts, entries, styles_of, yardstick
 from report.results.reader import Results
 from report.results.rows import in_order, lines_in_order
 

@@ -10,11 +10,11 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.roads import roads
 from report.analysis.standings import ACCURACIES, best_tolerances, recommended, shown, standings, swept
+from report.analysis.time_to_solution import roads
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.numbers import MISSING, listed, power, significant, tidy_power, whole
-from report.figures.lines import Cell, Group, grid
+from report.figures.line_charts import Cell, Group, grid
 from report.results.reader import Results
 
 EACH, PREPARED, FROM_SCENE = "each load case", "one, with preparation", "one, from the scene on"

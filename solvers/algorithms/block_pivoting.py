@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.stiffness.dense import product
+from problems.stiffness.dense_block import product
 from solvers.base import Answer
 from solvers.kkt import judged, kkt_status, rounding_of
 

@@ -33,7 +33,7 @@ from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
 from problems.stiffness.block import SparseBlock
-from problems.stiffness.sparse import sparse_block
+from problems.stiffness.sparse_block import sparse_block
 from solvers.base import LoadCase
 
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution

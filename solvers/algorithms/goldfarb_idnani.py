@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from problems.forms.assembly import Indices, Matrix, Vector
-from problems.stiffness.dense import product
+from problems.stiffness.dense_block import product
 from solvers.base import Status
 from solvers.kkt import EPS
 

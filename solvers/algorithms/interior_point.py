@@ -16,7 +16,7 @@ import numpy as np
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
-from problems.stiffness.dense import product
+from problems.stiffness.dense_block import product
 
 from .newton_system import Direct, NewtonSystem
 

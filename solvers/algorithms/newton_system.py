@@ -13,7 +13,7 @@ import scipy.linalg as sla
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.banded_inverse import BandedInverse
-from problems.stiffness.dense import product
+from problems.stiffness.dense_block import product
 
 
 @dataclass(frozen=True)

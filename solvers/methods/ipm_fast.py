@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from solvers.algorithms.interior_point import NewtonSteps, mehrotra, stp2
+from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.algorithms.newton_system import Banded, Direct, NewtonSystem
-from solvers.algorithms.sweeps import Sweeps
 from solvers.base import Answer, LoadCase, Problem, failed
 from solvers.method import Method, State
 

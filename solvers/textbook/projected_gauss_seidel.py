@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import blas
 
 from problems.forms.assembly import Matrix, Vector
-from problems.stiffness.dense import product
+from problems.stiffness.dense_block import product
 from solvers.base import Answer, LoadCase, require
 from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
 from solvers.method import Method, State, first_point

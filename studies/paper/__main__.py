@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from report.figures import style
-from report.writers.pages import emptied, written
+from report.writers.sections_writer import emptied, written
 
 from . import claims, figures5_7, table3, tables
 from .rows import study

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from report.analysis.standings import shown
 from report.document.blocks import Block, Figure, Section
 from report.figures import style
-from report.figures.lines import MARKS, against_contacts, entries
+from report.figures.line_charts import MARKS, against_contacts, entries
 
 from .rows import METHODS, Study, table
 from .table3 import LOOKS

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.roads import Exponent, exponent
+from report.analysis.time_to_solution import Exponent, exponent
 from report.document.blocks import Figure, Section
 from report.document.numbers import MISSING
 from report.figures import style

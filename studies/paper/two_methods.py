@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from report.analysis.roads import Exponent
+from report.analysis.time_to_solution import Exponent
 from report.document.numbers import power, significant, whole
 
 from . import table3

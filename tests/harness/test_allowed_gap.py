@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from commands import harness
-from long import draws
+from sample_size import draws
 from scipy.stats import beta
-from small import solve_by_nnls
-from strip import write_strip
+from small_problems import solve_by_nnls
+from strip_scene import write_strip
 
 from harness.results import series_file
 from harness.scene.allowed_gap import checked
@@ -23,7 +23,7 @@ from harness.verification.assess import GapError
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
 
 PAIRS = [{"pair": ["a", "b"], "start": 0, "stop": 2}, {"pair": ["b", "tool"], "start": 2, "stop": 4}]
@@ -32,8 +32,8 @@ CASES = 12
 
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
-    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
+    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
 
 
 @pytest.mark.parametrize(

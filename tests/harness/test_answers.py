@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from harness.conformance.known_problems import known_problems
-from harness.solving.answers import LARGEST_DETAILS, InvalidAnswer, checked, examined, figures
 from harness.solving.session import no_answer
+from harness.solving.solver_answer import LARGEST_DETAILS, InvalidAnswer, checked, examined, figures
 from problems.errors import InputError
 from problems.forms.problem import Problem, in_form
 from problems.load_cases.measured_gaps import _read

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small import make_load, make_prepared, solve_by_nnls
-from strip import STRIP, write_strip
+from small_problems import make_load, make_prepared, solve_by_nnls
+from strip_scene import STRIP, write_strip
 
 import harness
 from harness import (

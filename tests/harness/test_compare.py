@@ -9,7 +9,7 @@ from commands import harness
 from synthetic_results import no_answer, row, write_rows
 from typer.testing import Result
 
-from harness.results.sides import measurement
+from harness.results.comparison import measurement
 
 
 def compare(*words: object) -> Result:

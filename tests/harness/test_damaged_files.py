@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import harness
-from runs import changed, rows_of
-from strip import write_strip
+from strip_scene import write_strip
+from suite_runs import changed, rows_of
 from typer.testing import Result
 
-from harness.measurement.run import record_machine
+from harness.measurement.suite_run import record_machine
 from harness.planning.suite import read_written
 from harness.results import records, series_file
-from harness.results.kinds import refuse_unreadable
+from harness.results.row_validation import refuse_unreadable
 from harness.results.schema import SERIES
 from problems.errors import InputError
 
@@ -81,7 +81,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("series")
     write_strip(folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("report.writers.series.write", lambda directory: directory)
+        patch.setattr("report.writers.series_report.write", lambda directory: directory)
         assert solve_series(folder / "out").exit_code == 0
     return folder
 
@@ -89,7 +89,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def series(solved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The directory of a finished series of CASES cases; its report is not drawn."""
-    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
     return Path(shutil.copytree(solved, tmp_path / "copy")) / "out"
 
 

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-import tiny
+import tiny_joint
 from commands import harness
-from small import solve_by_nnls
-from strip import write_strip
+from small_problems import solve_by_nnls
+from strip_scene import write_strip
 
 from problems.build import load_case, prepared
 from problems.forms import Form
 from problems.forms.problem import in_form
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 READERS = Path(__file__).parents[2] / "examples" / "readers"
 EIGEN = Path("/usr/include/eigen3")
@@ -27,7 +27,7 @@ EIGEN = Path("/usr/include/eigen3")
 def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("scenes")
     write_strip(folder)
-    tiny.write_problem(folder / "tiny.npz")
+    tiny_joint.write_problem(folder / "tiny.npz")
     return folder
 
 
@@ -172,7 +172,7 @@ def test_forces_alone_are_judged_by_the_displacements_that_they_give(
 def test_the_tables_of_solve_are_answers(
     scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     assert harness("solve", scenes / "strip.toml", "--out", tmp_path).exit_code == 0
     for name in ("nodes.csv", "contacts.csv", "solution.npz"):
         assert harness("judge", tmp_path / name, scenes / "strip.toml").exit_code == 0

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import harness
-from joints import two_parts
+from small_joints import two_parts
 from test_place import FASTENERS, GAP
 
 from harness import solve
-from harness.explore.answers import CHANGED, Explorer, Settings
+from harness.explore.live_answers import CHANGED, Explorer, Settings
 from harness.explore.raster import Raster
-from harness.scene.edited import edited
+from harness.scene.scene_file import edited
 from problems.errors import InputError
 from problems.model.scene import JointScene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 PRESSURE = """
 [[effect]]

@@ -13,8 +13,8 @@ from problems.build import prepared
 from problems.errors import InputError
 from problems.forms import Form
 from problems.model.joint_model import JointModel
-from problems.scene import read_scene
-from problems.stiffness.band import half_bandwidth
+from problems.scene_files import read_scene
+from problems.stiffness.band_factor import half_bandwidth
 from solvers.base import FORMS
 
 LARGE, SMALL = read_scene("11308/4300"), read_scene("scaling/2522")

@@ -8,11 +8,11 @@ from xml.etree import ElementTree
 
 import pytest
 from commands import harness
-from runs import changed, moved, rows_of
+from suite_runs import changed, moved, rows_of
 from typer.testing import Result
 
 from harness.results import records
-from harness.results.sides import measurement
+from harness.results.comparison import measurement
 from harness.verification.findings import Baseline, Finding, read_baseline, write_junit
 from harness.verification.judge import Judgement
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tiny
-from runs import all_end
+import tiny_joint
+from suite_runs import all_end
 
-from harness.measurement import child
+from harness.measurement import child_process
 from harness.measurement.worker import measure
 from harness.planning.plan import Measurement
 
@@ -22,9 +22,9 @@ MIB = 300
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("measure")
-    tiny.write_problem(folder / "tiny.npz")
-    (folder / "faulty.py").write_text(tiny.FAULTY)
-    (folder / "exact.py").write_text(tiny.EXACT)
+    tiny_joint.write_problem(folder / "tiny.npz")
+    (folder / "faulty.py").write_text(tiny_joint.FAULTY)
+    (folder / "exact.py").write_text(tiny_joint.EXACT)
     return folder
 
 
@@ -135,7 +135,7 @@ def test_a_fault_is_a_status_with_a_reason(folder: Path, fault: str, status: str
 
 def test_the_start_does_not_count_against_the_time_limit(folder: Path) -> None:
     slow = folder / "slow.py"
-    slow.write_text("import time\ntime.sleep(1)\n" + tiny.EXACT)
+    slow.write_text("import time\ntime.sleep(1)\n" + tiny_joint.EXACT)
     row = outcome(folder, None, solver="slow", plugin=str(slow), time_limit_s=0.5)
     assert row["status"] == "solved"
 
@@ -156,10 +156,10 @@ def test_a_child_that_runs_on_does_not_answer_twice(folder: Path, fault: str) ->
 def test_an_orphan_that_is_in_no_list_yet_is_killed_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """A child that forks and dies before it is killed: what it forked is in the next list."""
     lists, killed = iter([[11], [11, 12], [11, 12]]), []
-    monkeypatch.setattr(child, "_children", lambda pid: next(lists))
-    monkeypatch.setattr(child, "_is_alive", lambda pid: False)
+    monkeypatch.setattr(child_process, "_children", lambda pid: next(lists))
+    monkeypatch.setattr(child_process, "_is_alive", lambda pid: False)
     monkeypatch.setattr(os, "kill", lambda pid, sent: killed.append(pid))
-    child.end_children(1)
+    child_process.end_children(1)
     assert killed == [11, 12]
 
 

@@ -11,22 +11,22 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import harness
-from joints import two_parts
 from scipy.stats import binom, binomtest
+from small_joints import two_parts
 
 from harness import solve
 from harness.placement import search as search_module
-from harness.placement.asked import PLANS, Asked
+from harness.placement.answer_journal import PLANS, Asked
 from harness.placement.candidates import Movable, Plan, grid, plan_of, uniform_plans
-from harness.placement.fresh import Cases, Goal, decided
-from harness.placement.fresh import searched as searched_by
+from harness.placement.fresh_cases import Cases, Goal, decided
+from harness.placement.fresh_cases import searched as searched_by
 from harness.placement.search import Search
 from harness.placement.session import Outcome, PlanSession, Question, Study
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 GAP = """
 [[effect]]

@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-import tiny
-from runs import rows_of, said_by
-from strip import write_strip
+import tiny_joint
+from strip_scene import write_strip
+from suite_runs import rows_of, said_by
 
-from harness.measurement.run import run as run_suite
+from harness.measurement.suite_run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
 from harness.results.provenance import HOOK_VARIABLES, ROOT, commit
@@ -20,7 +20,7 @@ from harness.series.run import run as run_series
 from harness.series.session import Job
 from problems import __version__
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 COPIED = (
     *("problems/__init__.py", "harness/__init__.py", "harness/results/__init__.py"),
@@ -122,7 +122,7 @@ def test_the_repository_of_another_project_is_not_ours(tmp_path: Path, tracked: 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:
     here = dict(zip(("commit", "clean"), commit(), strict=True))
-    suite = read_suite(str(tiny.write_suite(tmp_path, '[[solver]]\nname = "newton"\n')))
+    suite = read_suite(str(tiny_joint.write_suite(tmp_path, '[[solver]]\nname = "newton"\n')))
     said_by(run_suite, suite, tmp_path / "suite")
     scene = read_scene(str(write_strip(tmp_path)))
     job = Job(scene, random_gaps(scene, 3, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)

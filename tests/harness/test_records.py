@@ -15,9 +15,9 @@ from synthetic_results import no_answer, row
 from harness.results import records, schema
 from harness.terminal.console import Display
 from harness.verification.judge import Judgement
-from problems.drawn import EXAMPLES
 from problems.errors import InputError
 from problems.ladders import LADDERS
+from problems.random_scenes import EXAMPLES
 from solvers.base import Status
 
 PUBLISHED = Path(__file__).parents[2] / "results" / "published"

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-import tiny
+import tiny_joint
 from commands import harness
-from runs import heed_interrupts, moved, rows_of, said_by, wait_for
+from suite_runs import heed_interrupts, moved, rows_of, said_by, wait_for
 
-from harness.measurement.run import run
+from harness.measurement.suite_run import run
 from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite
 from harness.results import records
@@ -58,7 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def finished(folder: Path) -> Path:
     """A directory with the rows of a run; tests take a `copy`."""
     code, text = said_by(
-        run, read_suite(str(tiny.write_suite(folder, TWO, yardstick=True))), folder / "finished"
+        run, read_suite(str(tiny_joint.write_suite(folder, TWO, yardstick=True))), folder / "finished"
     )
     assert code == 0
     assert "4 measurements, 0 of them already" in text
@@ -243,8 +243,8 @@ def test_an_interrupted_run_keeps_its_rows_and_goes_on(folder: Path) -> None:
     variant = "hangs"
     options = {fault = "hang"}
     """
-    suite = tiny.write_suite(here, text, plugin="faulty.py", time_limit_s=100)
-    (here / "faulty.py").write_text(tiny.FAULTY)
+    suite = tiny_joint.write_suite(here, text, plugin="faulty.py", time_limit_s=100)
+    (here / "faulty.py").write_text(tiny_joint.FAULTY)
     rows = here / "out" / records.MEASUREMENTS
     command = [sys.executable, "-m", "harness", "run", str(suite), "--out", str(here / "out")]
     going = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, preexec_fn=heed_interrupts)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from runs import moved, rows_of, said_by
+from suite_runs import moved, rows_of, said_by
 
-from harness.measurement.run import run
+from harness.measurement.suite_run import run
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import expand
 from harness.planning.suite import Suite, read_suite

@@ -20,29 +20,29 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-import tiny
+import tiny_joint
 from rich.console import Console
-from runs import heed_interrupts, rows_of, said_by, series_rows, wait_for
-from strip import write_strip
+from strip_scene import write_strip
+from suite_runs import heed_interrupts, rows_of, said_by, series_rows, wait_for
 
 from harness.measurement import scheduler
-from harness.measurement.monitored import TRIM, environment
-from harness.measurement.run import run as run_suite
+from harness.measurement.monitored_call import TRIM, environment
 from harness.measurement.scheduler import (
     TASKS_PER_WORKER,
     done_as_completed,
     versions,
     workers,
 )
+from harness.measurement.suite_run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
-from harness.series.places import solve_on_worker
+from harness.series.executors import solve_on_worker
 from harness.series.run import run
 from harness.series.session import Job
 from problems.errors import InputError
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 pytestmark = pytest.mark.slow
 
@@ -241,7 +241,7 @@ def test_ctrl_c_in_a_terminal_ends_workers_without_a_word_of_theirs(tmp_path: Pa
 def test_a_worker_that_is_killed_costs_no_row(job: Job, tmp_path: Path, cluster: Any) -> None:
     """One of two workers dies in the middle: each case has one row, and gaps as if nothing had been."""
     slow = tmp_path / "slow.py"
-    slow.write_text(tiny.EXACT.replace("L = sla", "__import__('time').sleep(0.05); L = sla"))
+    slow.write_text(tiny_joint.EXACT.replace("L = sla", "__import__('time').sleep(0.05); L = sla"))
     job = replace(job, solver="slow", plugin=slow)
     out = tmp_path / "out"
     victim = pids(cluster)[0]
@@ -278,8 +278,8 @@ def test_a_measurement_that_kills_its_workers_is_left_and_said(cluster: Any, tmp
     their answers are brought here.
     """
     entries = '[[solver]]\nname = "newton"\n[[solver]]\nname = "exact"\n'
-    suite = read_suite(str(tiny.write_suite(tmp_path, entries)))
-    killer = tiny.EXACT.replace("L = sla", "import os; os.kill(os.getppid(), 9); L = sla")
+    suite = read_suite(str(tiny_joint.write_suite(tmp_path, entries)))
+    killer = tiny_joint.EXACT.replace("L = sla", "import os; os.kill(os.getppid(), 9); L = sla")
     (tmp_path / "exact.py").write_text(killer)
     code, said = said_by(
         lambda console: run_suite(suite, tmp_path / "out", console, cluster.scheduler_address)

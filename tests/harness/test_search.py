@@ -5,20 +5,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tiny
-from runs import rows_of, said_by
+import tiny_joint
+from suite_runs import rows_of, said_by
 
-from harness.measurement.run import run
-from harness.planning.due import START, due, stopped_at
+from harness.measurement.suite_run import run
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import DECADES, Measurement, expand
 from harness.planning.suite import read_suite, suite_from
+from harness.planning.tolerance_search import START, due, stopped_at
 from problems.errors import InputError
 from report.results.reader import read
 
 #: Right to a tenth of the tolerance; below `least` it gives up.
 ROUGH = (
-    tiny.EXACT.partition("        return")[0]
+    tiny_joint.EXACT.partition("        return")[0]
     + """
         if tolerance < self.least:
             return Answer("inaccurate", lam * (1 + self.least))
@@ -34,7 +34,7 @@ LOOSE = 2e-5  # mm: found in few steps
 
 def suite_of(folder: Path, limit_mm: float = 1e-7, **changes: Any) -> Any:
     (folder / "rough.py").write_text(ROUGH)
-    suite = read_suite(str(tiny.write_suite(folder, limit_mm=limit_mm)))
+    suite = read_suite(str(tiny_joint.write_suite(folder, limit_mm=limit_mm)))
     change = Overrides(solvers=("rough",), tolerances="auto", plugin=folder / "rough.py", **changes)
     return overridden(suite, change)
 
@@ -198,7 +198,7 @@ def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str,
 
 @pytest.mark.parametrize(("seconds", "repeats"), [(0.1, 5), (3.0, 3), (30.0, 1)])
 def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float, repeats: int) -> None:
-    suite = read_suite(str(tiny.write_suite(tmp_path))).model_copy(update={"repeats": "auto"})
+    suite = read_suite(str(tiny_joint.write_suite(tmp_path))).model_copy(update={"repeats": "auto"})
     plan = [m for m in expand(suite) if m.solver == suite.solver[0].name]
     rows = [row_of(plan[0], seconds)]
     others = [m for m in plan if m.tolerance == plan[0].tolerance and m.form == plan[0].form]
@@ -229,7 +229,7 @@ def test_tolerances_of_the_command_line() -> None:
 
 
 def test_a_series_searches_for_nothing(tmp_path: Path) -> None:
-    data = read_suite(str(tiny.write_suite(tmp_path))).model_dump(exclude_none=True)
+    data = read_suite(str(tiny_joint.write_suite(tmp_path))).model_dump(exclude_none=True)
     data |= {"series": {"cases": 2}, "tolerances": "auto", "repeats": "auto"}
     with pytest.raises(InputError) as caught:
         suite_from(data, tmp_path / "suite.toml")

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import tiny
-from runs import rows_of, said_by
-from small import solve_by_nnls
-from strip import write_strip
+import tiny_joint
+from small_problems import solve_by_nnls
+from strip_scene import write_strip
+from suite_runs import rows_of, said_by
 
-from harness.measurement.run import run
+from harness.measurement.suite_run import run
 from harness.planning.suite import read_suite
 from harness.results import records
 from harness.results.records import Row
@@ -24,8 +24,8 @@ from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import read_scene
-from report.sections.series import compared
+from problems.scene_files import read_scene
+from report.sections.series_throughput import compared
 
 pytestmark = pytest.mark.slow
 
@@ -79,7 +79,7 @@ options = { fault = "FAULT", only = 3 }
 def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("series")
     write_strip(folder)
-    (folder / "faulty.py").write_text(tiny.FAULTY)
+    (folder / "faulty.py").write_text(tiny_joint.FAULTY)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         yield

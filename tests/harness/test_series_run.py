@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tiny
+import tiny_joint
 from commands import harness
 from rich.console import Console
-from runs import series_rows, wait_for
-from small import solve_by_nnls
-from strip import write_strip
+from small_problems import solve_by_nnls
+from strip_scene import write_strip
+from suite_runs import series_rows, wait_for
 
 from harness.results import records, series_file
 from harness.results.schema import SERIES
@@ -26,13 +26,13 @@ from harness.series.session import Job, Result, SeriesSession
 from problems.build import load_case, prepared
 from problems.forms.problem import Dual
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 pytestmark = pytest.mark.slow
 
 COMMAND = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-SLOW = tiny.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
+SLOW = tiny_joint.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -40,7 +40,7 @@ def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("here")
         write_strip(folder)
-        (folder / "exact.py").write_text(tiny.EXACT)
+        (folder / "exact.py").write_text(tiny_joint.EXACT)
         (folder / "slow.py").write_text(SLOW)
         patch.chdir(folder)
         yield
@@ -49,7 +49,7 @@ def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
 @pytest.fixture(autouse=True)
 def _no_report(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its pictures take most of the time, and are tested in test_series_report."""
-    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
 
 
 def series(*arguments: str, code: int = 0) -> Any:
@@ -126,7 +126,7 @@ def test_a_full_disk_leaves_whole_cases() -> None:
 
 
 def test_a_directory_holds_one_kind_of_result(tmp_path: Path) -> None:
-    suite = tiny.write_suite(tmp_path)
+    suite = tiny_joint.write_suite(tmp_path)
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / records.MEASUREMENTS).touch()
     assert "another command" in series("--cases", "3", "--out", str(tmp_path / "run"), code=2).output
@@ -228,7 +228,7 @@ def results_of(count: int, check: int, **solver: Any) -> list[Result]:
 def test_a_solver_that_fails_is_a_row_and_its_answer_is_not_vouched_for(
     fault: str, verdicts: list[str]
 ) -> None:
-    Path("faulty.py").write_text(tiny.FAULTY)
+    Path("faulty.py").write_text(tiny_joint.FAULTY)
     results = results_of(4, 2, options={"fault": fault}, plugin=Path("faulty.py"))
     assert [result.row["verdict"] for result in results] == verdicts
     assert all((result.gap is None) == (result.row["verdict"] == "no_answer") for result in results)
@@ -256,7 +256,7 @@ def test_what_p_has_lost_in_rounding_is_in_the_bound(monkeypatch: pytest.MonkeyP
 def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault: str) -> None:
     """A plugin whose `batched` fails on one block."""
     text = (
-        tiny.EXACT
+        tiny_joint.EXACT
         + f"""
     def batched(self, state):
         def answers(loads, tolerance):

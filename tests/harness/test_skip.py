@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from harness.measurement.describe import Description, outdated
-from harness.measurement.row import Task, run_task
-from harness.planning.due import predicted_timeout
+from harness.measurement.solver_descriptions import Description, outdated
+from harness.measurement.task import Task, run_task
 from harness.planning.plan import expand
 from harness.planning.suite import suite_from
+from harness.planning.tolerance_search import predicted_timeout
 
 
 def plan(**changes):

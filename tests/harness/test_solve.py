@@ -12,16 +12,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import harness
-from joints import forbid_building, two_parts
 from matplotlib.image import imread
-from runs import said_by
-from small import solve_by_nnls
+from small_joints import forbid_building, two_parts
+from small_problems import solve_by_nnls
+from suite_runs import said_by
 
 from harness.results.records import read_arrays
 from harness.scene.solve import solve
 from problems.build import load_case, model_of, prepared
-from problems.scene import read_scene
-from report.writers.solution import grid_with_fields, write_vtu
+from problems.scene_files import read_scene
+from report.writers.answer_report import grid_with_fields, write_vtu
 
 ROOT = Path(__file__).parents[2]
 SCENE = """
@@ -66,7 +66,7 @@ value = 1e-3
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes most of the time: only for `solved`."""
-    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
 
 
 def run(folder: Path, text: str = SCENE, solver: str | None = None, preload: float = 80.0) -> dict[str, Any]:
@@ -315,7 +315,7 @@ def test_a_full_disk_leaves_the_older_answer(tmp_path: Path, monkeypatch: pytest
     def full(*_: object) -> None:
         raise OSError(27, "File too large")
 
-    monkeypatch.setattr("report.writers.solution.write_page", full)
+    monkeypatch.setattr("report.writers.answer_report.write_page", full)
     done = harness("solve", scene, "--out", out)
     assert done.exit_code == 2
     assert "File too large" in done.output

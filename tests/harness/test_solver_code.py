@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.measurement.describe import code_of
+from harness.measurement.solver_descriptions import code_of
 from problems.storage import ROOT, fingerprint
 from solvers.plugin import own_files
 from solvers.registry import make_solver, modules, owner_of, solver_version

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from runs import moved, rows_of, said_by
-from strip import write_strip
+from strip_scene import write_strip
+from suite_runs import moved, rows_of, said_by
 
-from harness.measurement.run import run
+from harness.measurement.suite_run import run
 from harness.planning.suite import read_suite
 from harness.results import records
 from harness.verification.gate import gate

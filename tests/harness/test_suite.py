@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import tiny
+import tiny_joint
 from commands import harness
 
 from harness.planning.overrides import Overrides, overridden
@@ -28,7 +28,7 @@ time_limit_s = 3
 
 
 def plan_of(tmp_path: Path, **keys: object) -> list[Measurement]:
-    return expand(read_suite(str(tiny.write_suite(tmp_path, TWO, **keys))))
+    return expand(read_suite(str(tiny_joint.write_suite(tmp_path, TWO, **keys))))
 
 
 @pytest.mark.parametrize("name", suite_names())
@@ -89,14 +89,14 @@ def test_an_entry_may_have_numbers_of_threads_of_its_own(tmp_path: Path) -> None
 
 
 def test_what_is_written_beside_the_rows_reads_back_the_same(tmp_path: Path) -> None:
-    suite = read_suite(str(tiny.write_suite(tmp_path, TWO, title='a "quoted" title — ü')))
+    suite = read_suite(str(tiny_joint.write_suite(tmp_path, TWO, title='a "quoted" title — ü')))
     odd = {"description": "\x7f\n\\ \U0001f600", "time_limit_by_size_s": {12: 1e-9}}
     suite = suite.model_copy(update=odd)
     assert validated(tomllib.loads(to_toml(suite)), tmp_path / "suite.toml") == suite
 
 
 def test_the_file_of_a_suite_is_not_written(tmp_path: Path) -> None:
-    path = tiny.write_suite(tmp_path, TWO).rename(tmp_path / "suite.toml")
+    path = tiny_joint.write_suite(tmp_path, TWO).rename(tmp_path / "suite.toml")
     before = path.read_text()
     done = harness("run", path, "--out", tmp_path)
     assert done.exit_code == 2
@@ -113,7 +113,7 @@ def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
     name = "piqp"
     forms = ["duel"]
     """
-    path = tiny.write_suite(tmp_path, text, scenes=["4386/9999"], time_limit_s=-1, tolerence=[1.0])
+    path = tiny_joint.write_suite(tmp_path, text, scenes=["4386/9999"], time_limit_s=-1, tolerence=[1.0])
     with pytest.raises(InputError) as caught:
         read_suite(str(path))
     faults = {fault.key: fault for fault in caught.value.faults}
@@ -130,7 +130,7 @@ def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
 
 
 def test_a_value_that_may_be_a_word_has_one_fault(tmp_path: Path) -> None:
-    path = tiny.write_suite(tmp_path, TWO, repeats=0, tolerances=[0.0, "auto"])
+    path = tiny_joint.write_suite(tmp_path, TWO, repeats=0, tolerances=[0.0, "auto"])
     with pytest.raises(InputError) as caught:
         read_suite(str(path))
     said = {fault.key: fault.allowed for fault in caught.value.faults}
@@ -138,13 +138,13 @@ def test_a_value_that_may_be_a_word_has_one_fault(tmp_path: Path) -> None:
     assert said["tolerances.0"] == "must be greater than 0"
     assert set(said) == {"repeats", "tolerances.0", "tolerances.1"}
     with pytest.raises(InputError, match="repeats = 'often': must be 'auto'"):
-        read_suite(str(tiny.write_suite(tmp_path, TWO, repeats="often")))
+        read_suite(str(tiny_joint.write_suite(tmp_path, TWO, repeats="often")))
 
 
 def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> None:
     text = '[[solver]]\nname = "gi"\n[[solver]]\nname = "gi"\noptions = {a = 1}\n'
     with pytest.raises(InputError, match=r"solver\.1\.variant"):
-        read_suite(str(tiny.write_suite(tmp_path, text)))
+        read_suite(str(tiny_joint.write_suite(tmp_path, text)))
 
 
 def test_unknown_suite_names_the_known_ones() -> None:
@@ -155,7 +155,9 @@ def test_unknown_suite_names_the_known_ones() -> None:
 class TestOverrides:
     @pytest.fixture
     def suite(self, tmp_path: Path) -> Suite:
-        return read_suite(str(tiny.write_suite(tmp_path, TWO, scenes=["tiny.npz", "4386/0052", "6112/0120"])))
+        return read_suite(
+            str(tiny_joint.write_suite(tmp_path, TWO, scenes=["tiny.npz", "4386/0052", "6112/0120"]))
+        )
 
     def test_scenes_sizes_and_solvers(self, suite: Suite) -> None:
         changed = overridden(suite, Overrides(sizes=(6112,), solvers=("gi", "exact")))
@@ -180,7 +182,7 @@ class TestOverrides:
 
     def test_a_plugin_joins_the_suites_solvers(self, suite: Suite, tmp_path: Path) -> None:
         own = tmp_path / "mine.py"
-        own.write_text(tiny.EXACT)
+        own.write_text(tiny_joint.EXACT)
         suite = suite.model_copy(update={"solver": suite.solver[1:]})
         changed = overridden(suite, Overrides(plugin=own))
         assert [entry.name for entry in changed.solver] == ["piqp", "mine"]
@@ -200,7 +202,7 @@ class TestOverrides:
 
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
-    tiny.write_problem(tmp_path / "other" / "tiny.npz")
+    tiny_joint.write_problem(tmp_path / "other" / "tiny.npz")
     with pytest.raises(InputError, match="another is called tiny too"):
         plan_of(tmp_path, scenes=["tiny.npz", "other/tiny.npz"])
 
@@ -210,7 +212,7 @@ def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
 
 def versions_asked(tmp_path: Path, *requirements: str, **more: tuple[str, ...]) -> list[tuple[str, str, str]]:
     suite = overridden(
-        read_suite(str(tiny.write_suite(tmp_path, TWO))), Overrides(requirements=requirements, **more)
+        read_suite(str(tiny_joint.write_suite(tmp_path, TWO))), Overrides(requirements=requirements, **more)
     )
     assert suite_from(tomllib.loads(to_toml(suite)), tmp_path / "small.toml") == suite
     return [(e.name, e.label, e.version) for e in suite.solver]
@@ -234,7 +236,7 @@ def test_each_version_is_an_entry_of_its_own(tmp_path: Path) -> None:
 
 def test_a_version_is_part_of_what_a_row_is_of(tmp_path: Path) -> None:
     text = TWO + 'with = ["piqp==0.6.2", "numpy==2.1.0"]\n'
-    plan = expand(read_suite(str(tiny.write_suite(tmp_path, text))))
+    plan = expand(read_suite(str(tiny_joint.write_suite(tmp_path, text))))
     assert plan[-1].key == "tiny piqp primal plain 0.6.2 numpy==2.1.0 tol=1e-06 threads=1 repeat=0"
     assert plan[-1].requirements == ("piqp==0.6.2", "numpy==2.1.0")
     (entry,) = with_key(read_suite(str(tmp_path / "small.toml")), plan[-1].key).solver
@@ -246,10 +248,10 @@ def test_a_version_is_exact(tmp_path: Path, requirement: str) -> None:
     with pytest.raises(InputError, match=r"NAME==VERSION, as piqp==0\.6\.2"):
         versions_asked(tmp_path, requirement)
     with pytest.raises(InputError, match=r"solver.1.with.*must be NAME==VERSION"):
-        read_suite(str(tiny.write_suite(tmp_path, TWO + f'with = ["{requirement}"]\n')))
+        read_suite(str(tiny_joint.write_suite(tmp_path, TWO + f'with = ["{requirement}"]\n')))
 
 
 def test_versions_that_could_not_be_told_apart_are_refused(tmp_path: Path) -> None:
     other = '[[solver]]\nname = "piqp"\nvariant = "plain 0.6.2"\n'
     with pytest.raises(InputError, match="other `with` under this variant"):
-        read_suite(str(tiny.write_suite(tmp_path, TWO + 'with = ["piqp==0.6.2"]\n' + other)))
+        read_suite(str(tiny_joint.write_suite(tmp_path, TWO + 'with = ["piqp==0.6.2"]\n' + other)))

@@ -11,7 +11,7 @@ import pytest
 from commands import harness
 from superelements import flat, stiffnesses, two_plates, write_part
 
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import harness
-from joints import two_parts
 from matplotlib.image import imread
+from small_joints import two_parts
 
 from harness.cli.scene import STARTER
 from harness.scene.solve import fastener_forces
 from problems.build import load_case, prepared
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 FASTENERS = """
 [[effect]]
@@ -111,7 +111,7 @@ def test_scenes_with_other_contacts_are_refused(old: str, new: str, tmp_path: Pa
 
 
 def test_the_starter_is_a_scene_that_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     path = tmp_path / "new" / "joint.toml"
     assert harness("init", path).exit_code == 0
     assert harness("validate", path).exit_code == 0

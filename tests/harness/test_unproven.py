@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from rich.console import Console
-from runs import said_by
+from suite_runs import said_by
 
-from harness.measurement.run import summary as summary_of_run
+from harness.measurement.suite_run import summary as summary_of_run
 from harness.scene.solve import solve
 from harness.series.run import summary
 from problems.build import prepared
 from problems.errors import InputError
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
 

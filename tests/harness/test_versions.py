@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tiny
+import tiny_joint
 from commands import harness
 from rich.console import Console
 
 from harness.measurement.environments import COMPLETE
-from harness.measurement.run import run as measure
+from harness.measurement.suite_run import run as measure
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.suite import read_suite
 from harness.results import records
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 #: What each version of the library holds. Its solver multiplies the exact answer by FACTOR.
 LIBRARY = {"1.0": "import needed\nFACTOR = needed.ONE", "2.0": "factor = 1.0"}
-PLUGIN = tiny.EXACT.replace("import numpy", "import fakelib\nimport numpy", 1).replace(
+PLUGIN = tiny_joint.EXACT.replace("import numpy", "import fakelib\nimport numpy", 1).replace(
     '"solved", lam', '"solved", fakelib.FACTOR * lam'
 )
 
@@ -44,7 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("versions")
     write_wheel(folder / "wheels", "fakelib", "1.0", LIBRARY["1.0"], "needed", "numpy")
     write_wheel(folder / "wheels", "needed", "1.0", "ONE = 1.0")
-    tiny.write_suite(folder, '[[solver]]\nname = "fake"\n', plugin="fake.py")
+    tiny_joint.write_suite(folder, '[[solver]]\nname = "fake"\n', plugin="fake.py")
     (folder / "fake.py").write_text(PLUGIN)
     return folder
 

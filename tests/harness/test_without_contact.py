@@ -15,7 +15,7 @@ from harness.scene.export import export, import_
 from harness.scene.solve import solve
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 QUIET = Console(file=StringIO())
 #: A strip of 400 × 40 mm clamped at y = 400 and pressed at y = 0; ν = 0 makes it a beam.
@@ -51,7 +51,7 @@ def answered(path: Path, out: Path, solver: str | None = None) -> dict[str, Any]
 def test_a_part_alone_is_a_linear_solve(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
     monkeypatch.setattr(
-        "problems.stiffness.dense.lapack.dpotri", lambda *_: pytest.fail("K was inverted for Q")
+        "problems.stiffness.dense_block.lapack.dpotri", lambda *_: pytest.fail("K was inverted for Q")
     )
     found = answered(path, path.parent / "out", solver="piqp")
     assert (found["n"], found["m"], found["qp"]) == (18, 0, False)

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints import forbid_building, make_joint, make_scene
+from small_joints import forbid_building, make_joint, make_scene
 
 from problems import build, storage
 from problems.effects.supports import Supports
 from problems.errors import InputError
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from problems.storage import ROOT
 
 ARRAYS = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
@@ -180,8 +180,8 @@ OWN = "input.user_matrices"  # makes a user's matrices, no joint's
 @pytest.mark.parametrize(
     "module",
     [
-        *("model.plate", "model.condense"),
-        *("model.joint", "model.part", "stiffness.dense", "forms.stages", "effects.supports", OWN),
+        *("model.plate", "model.condensation"),
+        *("model.joint", "model.part", "stiffness.dense_block", "forms.preparation_stages", "effects.supports", OWN),
     ],
 )
 def test_a_change_of_the_code_that_builds_changes_the_key(

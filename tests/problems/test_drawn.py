@@ -6,19 +6,19 @@ from pathlib import Path
 
 import pytest
 
-import problems.drawn
+import problems.random_scenes
 from harness.cli.listing import listing
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite, read_written, resolved_scenes, to_toml
 from harness.results.schema import DRAWN
-from problems.drawn import MEANS, ROWS, SIZES, drawn_names
 from problems.effects.initial_gap import RandomField
 from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
 from problems.model.positions import Pattern
 from problems.model.scene import JointScene
-from problems.scene import read_scene, scene_names
+from problems.random_scenes import MEANS, ROWS, SIZES, drawn_names
+from problems.scene_files import read_scene, scene_names
 
 DRAWS = [f"{DRAWN}{n}/{k}" for k in range(167) for n in SIZES]  # 501
 
@@ -41,7 +41,7 @@ def parts_of(scene: JointScene) -> tuple[float, RandomField, float, Pattern, tup
 
 def test_a_name_gives_the_same_scene_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
     """The digits are those of `printf 0.2.0/4386/7 | sha256sum`."""
-    monkeypatch.setattr(problems.drawn, "__version__", "0.2.0")
+    monkeypatch.setattr(problems.random_scenes, "__version__", "0.2.0")
     digits = "95027862 19d95e89 ed46722a 5f628451 bad6274f 1b458304 48266b9b 301c15a3"
     shares = [int(word, 16) / 2**32 for word in digits.split()]
     scene = drawn_scene("drawn/4386/7")

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from joints import two_parts
+from small_joints import two_parts
 
 from problems.errors import Fault, InputError
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 JOINT = two_parts(nodes=(5, 3))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joints import make_joint, make_scene
 from pydantic import ValidationError
+from small_joints import make_joint, make_scene
 
 from problems.effects.clamps import Clamps
 from problems.effects.fasteners import Fasteners

@@ -14,7 +14,7 @@ from commands import harness
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
-from small import make_load, make_prepared, solve_by_nnls
+from small_problems import make_load, make_prepared, solve_by_nnls
 
 from harness.scene.export import export, import_, matrices
 from harness.scene.solve import solve
@@ -27,7 +27,7 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.compliance import ComplianceProducts
 from problems.forms.prepared import Prepared
 from problems.input.matrix_files import apparent_digits
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
 
 ROOT = Path(__file__).parents[2]

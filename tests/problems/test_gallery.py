@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from small import solve_by_nnls
+from small_problems import solve_by_nnls
 
 from harness.verification.reference import reference
 from problems.build import load_case, prepared
@@ -11,7 +11,7 @@ from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
-from problems.scene import Scene, read_scene, scene_names
+from problems.scene_files import Scene, read_scene, scene_names
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
 Array = NDArray[np.float64]

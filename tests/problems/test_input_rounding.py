@@ -16,7 +16,7 @@ from problems import storage
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.input.user_matrices import read_matrices
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 EXTENDED = np.finfo(np.longdouble).nmant > 53
 N = 4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 from exact_answer import is_exact
-from long import tried
+from sample_size import tried
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
@@ -23,7 +23,7 @@ from problems.forms.problem import in_form
 from problems.ladders import ladders, make_rung, rung_names
 from problems.ladders.manufactured import contacts, exact_assembly, spectrum, two_parts
 from problems.model.scene import ManufacturedProblem, ManufacturedScene
-from problems.scene import read_scene, scene_names
+from problems.scene_files import read_scene, scene_names
 from solvers.base import Answer, Form
 from solvers.registry import make_solver
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from strip import write_strip
+from strip_scene import write_strip
 
 from problems.build import load_case, prepared
 from problems.errors import InputError
@@ -15,7 +15,7 @@ from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.sweep import sweep
 from problems.model.scene import Scene
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 RANDOM = "random = { sd = 0.2, correlation_length = 100.0, seed = 7 }"
 
@@ -100,9 +100,9 @@ def test_the_field_comes_from_the_options_where_the_scene_has_none(tmp_path: Pat
 
 
 def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
-    import tiny
+    import tiny_joint
 
-    own = read_scene(str(tiny.write_problem(tmp_path / "own.npz")))
+    own = read_scene(str(tiny_joint.write_problem(tmp_path / "own.npz")))
     with pytest.raises(InputError, match="--gaps"):
         random_gaps(own, 5, 0)
     table = tmp_path / "gaps.csv"

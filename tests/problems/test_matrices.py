@@ -17,7 +17,7 @@ from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.input.matrix_files import read_mtx
 from problems.input.user_matrices import checked
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 RNG = np.random.default_rng(11)
 BASIS = RNG.standard_normal((4, 4))

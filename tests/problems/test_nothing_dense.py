@@ -12,8 +12,8 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 from commands import harness
-from joints import two_parts
 from scipy.sparse.linalg import spsolve
+from small_joints import two_parts
 from sparse_matrices import band_matrix, renumbered
 
 from harness import load_scene, own_matrices, solve
@@ -26,8 +26,8 @@ from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from problems.input import matrix_files
 from problems.model.joint_model import JointModel
-from problems.scene import read_scene
-from problems.stiffness.dense import DenseBlock
+from problems.scene_files import read_scene
+from problems.stiffness.dense_block import DenseBlock
 
 N, M = 3000, 40
 NODES = (200, 8)

@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from joints import make_joint, make_scene, two_parts, untied
+from small_joints import make_joint, make_scene, two_parts, untied
 
 from problems.build import prepared
 from problems.model.effect import effect_class, effect_kinds
 from problems.model.scene import plain
-from problems.scene import read_scene, scene_names
+from problems.scene_files import read_scene, scene_names
 
 ROOT = Path(__file__).parents[2]
 JOINT = two_parts()
@@ -41,7 +41,7 @@ import os, sys, numpy as np
 import problems
 assert problems.__path__ == [os.path.join(os.getcwd(), "problems")]
 from problems.build import load_case, prepared
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 assert not any(m.startswith("problems.effects.") for m in sys.modules)
 for scene_file in sys.argv[1:]:
     if os.fork():

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from long import ASKED
+from sample_size import ASKED
 from synthetic_results import row, write_rows
 
 from harness.planning.form_choice import chosen_form
@@ -18,7 +18,7 @@ from problems.errors import InputError
 from problems.forms import FORMS
 from problems.ladders import rung_names
 from problems.ladders.outside import FREE, alone, exact, journal_bearing
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from report.results.reader import read
 from report.sections import outside
 from solvers.registry import make_solver

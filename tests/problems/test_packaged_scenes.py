@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from solving import solve
+from solver_forms import solve
 
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms.prepared import Prepared
-from problems.scene import SCENES, Scene, read_scene, scene_names
+from problems.scene_files import SCENES, Scene, read_scene, scene_names
 
 COMPARED = [name for name in scene_names() if not name.startswith("gallery/")]
 SCALING = [name for name in COMPARED if name.startswith("scaling/")]

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints import make_joint, make_scene
 from numpy.typing import NDArray
+from small_joints import make_joint, make_scene
 
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners

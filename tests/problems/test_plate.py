@@ -7,9 +7,9 @@ import pytest
 import skfem
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joints import degrees, dof
 from numpy.polynomial import Polynomial
 from skfem.helpers import dd, ddot, eye, trace
+from small_joints import degrees, dof
 
 from problems.effects.ribs import Ribs
 from problems.effects.stringers import Stringers

@@ -18,15 +18,15 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import skfem
-from long import ASKED
 from numpy.typing import NDArray
+from sample_size import ASKED
 from skfem.helpers import dd, ddot, eye, trace
 
 from harness.solving.session import answer_of
 from problems.build import load_case, prepared
 from problems.model.joint import Joint, Part
 from problems.model.scene import JointScene
-from problems.scene import read_scene, scene_of
+from problems.scene_files import read_scene, scene_of
 from solvers.registry import make_solver
 
 Array = NDArray[np.float64]

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from joints import make_joint, make_scene
+from small_joints import make_joint, make_scene
 from superelements import flat, scene_from, stiffnesses, write_part
 
 from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
+from problems.load_cases.gaps_through_scan import NOISE
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
-from problems.load_cases.scan import NOISE
 
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from problems.errors import Fault, InputError
-from problems.scene import ASSEMBLIES, read_scene
+from problems.scene_files import ASSEMBLIES, read_scene
 
 SCENE = """
 title = "a strip"

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import threadpoolctl
-from long import seeds
+from sample_size import seeds
 from sparse_matrices import band_matrix, chain, graph_matrix, renumbered
 
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Matrix
-from problems.scene import read_scene
-from problems.stiffness import band, banded
-from problems.stiffness.band import half_bandwidth, lower_band
-from problems.stiffness.banded import BandedBlock
+from problems.scene_files import read_scene
+from problems.stiffness import band_factor, banded_block
+from problems.stiffness.band_factor import half_bandwidth, lower_band
+from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.cholmod import Cholmod
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.sparse import GeneralBlock, sparse_block
+from problems.stiffness.sparse_block import GeneralBlock, sparse_block
 from problems.stiffness.superlu import SuperLU
 
 
@@ -44,7 +44,7 @@ def scattered(random: np.random.Generator, n: int, half: int) -> tuple[sp.csc_ar
 
 def test_a_band_is_factored_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit holds for the factorisation alone."""
-    seen, dpbtrf = [], band.lapack.dpbtrf
+    seen, dpbtrf = [], band_factor.lapack.dpbtrf
 
     def counted() -> set[int]:
         return {pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"}
@@ -53,9 +53,9 @@ def test_a_band_is_factored_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> No
         seen.append(counted())
         return dpbtrf(band, **how)
 
-    monkeypatch.setattr(band, "lapack", SimpleNamespace(dpbtrf=factor))
+    monkeypatch.setattr(band_factor, "lapack", SimpleNamespace(dpbtrf=factor))
     before = counted()
-    L, info = band.band_cholesky(np.array([[4.0, 5.0], [2.0, 0.0]], order="F"))
+    L, info = band_factor.band_cholesky(np.array([[4.0, 5.0], [2.0, 0.0]], order="F"))
     assert (L.tolist(), info, seen, counted()) == ([[2.0, 2.0], [1.0, 0.0]], 0, [{1}], before)
 
 
@@ -202,8 +202,8 @@ def test_a_scene_with_a_mechanism_is_bad_input_that_says_where_it_moves(
 def test_the_compliance_of_many_bodies_takes_few_blocks(body: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not one for each body; with contacts between neighbours, and one from the first body to the last."""
     n, made = 600, []
-    blocks = banded.band_blocks
-    monkeypatch.setattr(banded, "band_blocks", lambda *given: made.append(1) or blocks(*given))
+    blocks = banded_block.band_blocks
+    monkeypatch.setattr(banded_block, "band_blocks", lambda *given: made.append(1) or blocks(*given))
     K = sp.csc_array(sp.block_diag([np.eye(body) * body + 1.0] * (n // body)))
     A = sp.csc_array(sp.eye_array(n) - sp.eye_array(n, k=-1) + sp.csc_array(([0.5], ([n - 1], [0])), (n, n)))
     found = Stiffness.of(K).compliance(A)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 import scipy.sparse as sp
-from joints import make_joint, make_scene
-from long import seeds
-from small import make_load, make_prepared
+from sample_size import seeds
+from small_joints import make_joint, make_scene
+from small_problems import make_load, make_prepared
 from sparse_matrices import band_matrix, graph_matrix, renumbered
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix
@@ -20,13 +20,13 @@ from problems.forms.prepared import Prepared
 from problems.model.effect import Effect, effect_class
 from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
-from problems.scene import read_scene, scene_names
-from problems.stiffness.band import half_bandwidth
-from problems.stiffness.banded import BandedBlock
-from problems.stiffness.dense import DenseBlock
+from problems.scene_files import read_scene, scene_names
+from problems.stiffness.band_factor import half_bandwidth
+from problems.stiffness.banded_block import BandedBlock
+from problems.stiffness.dense_block import DenseBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.selected_inverse import selected_inverse
-from problems.stiffness.sparse import GeneralBlock, sparse_block
+from problems.stiffness.sparse_block import GeneralBlock, sparse_block
 
 SINGLE = 2e-5  # of √(Z_ii Z_jj): float32, through a few dozen blocks
 

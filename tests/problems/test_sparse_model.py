@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from commands import harness
-from joints import make_joint, make_scene
 from scipy.sparse.linalg import splu
+from small_joints import make_joint, make_scene
 from test_only_what_is_called_for import TABLES, scene_of
 
-from problems import scene as reading
+from problems import scene_files as reading
 from problems.build import load_case, model_of, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
@@ -24,12 +24,12 @@ from problems.effects.supports import Supports
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Matrix
-from problems.model.condense import NotPositiveDefinite, condense
+from problems.model.condensation import NotPositiveDefinite, condense
 from problems.model.effect import effect_class
 from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
-from problems.scene import read_scene, scene_names
-from problems.stiffness.band import half_bandwidth
+from problems.scene_files import read_scene, scene_names
+from problems.stiffness.band_factor import half_bandwidth
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
 END = {"length": 90.0, "elements": 2}
@@ -192,7 +192,7 @@ def test_one_solve_makes_one_model_and_reads_its_scene_once(
 
     monkeypatch.setattr(JointModel, "of", classmethod(counted))
     monkeypatch.setattr(reading, "read_toml", counted_read)
-    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     path = scene_of(tmp_path, "initial_gap", "pressure", "self_weight")
     done = harness("solve", path, "--form", form, "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from joints import make_joint, make_scene
+from small_joints import make_joint, make_scene
 
 from problems.build import load_case
 from problems.effects.fasteners import Fasteners

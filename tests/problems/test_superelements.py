@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import skfem
-from joints import make_scene
 from skfem.helpers import dd, ddot, eye, trace
+from small_joints import make_scene
 from superelements import Array, Tables, flat, scene_from, solved, stiffnesses, two_plates, write_part
 
 from problems.build import load_case, model_of, prepared
 from problems.errors import InputError
-from problems.model.pairing import Face, paired
+from problems.model.contact_pairing import Face, paired
 from problems.model.scene import JointScene
 from problems.model.surface import surface_of
-from problems.scene import scene_of
+from problems.scene_files import scene_of
 
 JOINT = two_plates()
 FASTENERS = {"kind": "fasteners", "preload": 900.0, "points": [[50.0, 30.0], [231.0, 47.0]]}

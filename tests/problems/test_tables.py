@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from joints import make_joint, make_scene
+from small_joints import make_joint, make_scene
 
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap

@@ -25,7 +25,7 @@ import pytest
 import scipy.sparse as sp
 
 from harness import own_matrices, solve
-from problems.scene import Scene
+from problems.scene_files import Scene
 
 EI, BED, WEIGHT = 3.5e8, 0.01, 0.0154  # N mm², N/mm², N/mm: a steel bar of 20 mm × 10 mm on foam
 BETA = (BED / (4 * EI)) ** 0.25  # 1/mm

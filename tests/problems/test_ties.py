@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import scipy.linalg as sla
-from joints import make_joint, make_scene, untied
 from scipy.interpolate import RegularGridInterpolator
+from small_joints import make_joint, make_scene, untied
 
 from problems.build import prepared
 from problems.effects.installed_fasteners import InstalledFasteners
@@ -65,7 +65,7 @@ def test_springs_between_nodes_leave_K_symmetric_to_the_last_bit() -> None:
 def test_installing_a_fastener_condenses_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     effect = Supports(kind="supports", part="a", points=((0.0, 0.0),), stiffness_per_point=123.0)
     prepared(make_scene(TWO, effect))
-    condense = "problems.model.condense.condense"
+    condense = "problems.model.condensation.condense"
     monkeypatch.setattr(condense, lambda *_: pytest.fail("condensed the parts again"))
     first = prepared(make_scene(TWO, effect, fastener((100.0, 0.0))))
     again = prepared(

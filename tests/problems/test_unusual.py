@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from problems.drawn import EXAMPLES
-from problems.scene import read_scene, scene_names, scene_of
+from problems.random_scenes import EXAMPLES
+from problems.scene_files import read_scene, scene_names, scene_of
 
 PART = {"name": "a", "thickness": 3.0, "north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 JOINT = {

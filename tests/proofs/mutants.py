@@ -62,7 +62,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "norm = np.linalg.norm(v / scale, axis=0)": ("norm = np.linalg.norm(v, axis=0) / scale",),
         " + ETA * (norm > 0)": ("",),
     },
-    "harness/verification/balanced.py": {
+    "harness/verification/balanced_units.py": {
         "panel * D[columns] * D[rows, None]": ("panel * D[rows, None]",),
         "panel.data * D[columns][panel.indices] * np.repeat": ("panel.data * np.repeat",),
         " * np.repeat(D[rows], np.diff(panel.indptr))": ("",),
@@ -138,7 +138,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "np.divide(units.stiffest, units.sigma2) if",
         ),
     },
-    "problems/stiffness/dense.py": {
+    "problems/stiffness/dense_block.py": {
         "(1 + relative) * row**2": ("row**2", "(1 + relative / 2) * row**2", "(1 + relative) * row"),
         " + epsilon / (1 - epsilon) * length": ("",),
         "gamma(3 * self.size)": ("gamma(self.size)",),
@@ -153,7 +153,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "np.abs(R, out=R)": ("pass",),
         "    if info:\n            return None\n        largest": ("    largest",),
     },
-    "harness/verification/near.py": {
+    "harness/verification/closed_contacts.py": {
         "C = C & ~negative": ("C = C",),
         "u - near.product(t * near.R)": ("u",),
         "(v / self.R)[self.M.order]": ("v[self.M.order]",),
@@ -173,7 +173,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "harness/verification/reference.py": {
         "[ESTIMATED * about for about in": ("[4 * ESTIMATED * about for about in",),
     },
-    "problems/stiffness/banded.py": {
+    "problems/stiffness/banded_block.py": {
         "gamma(2 * (len(L) + 1)) * _norm(L) + ": ("",),
         "gamma(2 * (len(L) + 1))": ("gamma(len(L) + 1)",),
         "_norm(L) + U * (largest + abs(s))": ("_norm(L)",),
@@ -205,18 +205,18 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "round(self.gap_mm, DIGITS), self.plan": ("0.0, self.plan",),
         "set(more := self._deciding(after)) <= set(cases)": ("(more := self._deciding(after))",),
     },
-    "harness/placement/fresh.py": {
+    "harness/placement/fresh_cases.py": {
         "(1 - self.share) * cases / 2": ("(1 - self.share) * cases",),
         "binom.cdf(c, n, q) <= alpha / 2": ("binom.cdf(c, n, q) <= alpha",),
         "cases, 1 - self.share) <= alpha / 2": ("cases, 1 - self.share) <= alpha",),
         "ALPHA / 2 ** (len(samples) + 1)": ("ALPHA / 2",),
     },
-    "problems/input/entries.py": {
+    "problems/input/matrix_entries.py": {
         "SYMMETRY * sizes[i] * sizes[j]": ("SYMMETRY * sizes.max() ** 2",),
         "if M.nnz < len(values)": ("if False",),
         "M + sign * M.multiply(alone).T": ("M + sign * M.T",),
     },
-    "solvers/algorithms/sweeps.py": {
+    "solvers/algorithms/newton_sweeps.py": {
         "self.A.T @ change.f / self.squares": ("self.A.T @ change.f",),
         "np.clip(-force @ y / (force @ moved or 1.0), 0.0, 1.0)": ("1.0",),
         "same &= k and not": ("same &= not",),
@@ -241,27 +241,27 @@ MUTANTS = [
 TESTS = {
     "harness/verification/enclosure.py": ("proofs/test_enclosure.py",),
     "harness/verification/findings.py": ("harness/test_gate_baseline.py",),
-    "harness/verification/balanced.py": (
+    "harness/verification/balanced_units.py": (
         "proofs/test_enclosure.py",
         "proofs/test_definite.py",
         "proofs/test_proof.py",
     ),
     "harness/verification/proof.py": ("proofs/test_proof.py",),
-    "harness/verification/near.py": ("proofs/test_proof.py",),
+    "harness/verification/closed_contacts.py": ("proofs/test_proof.py",),
     "harness/verification/assess.py": ("proofs/test_proof.py", "harness/test_allowed_gap.py"),
     "harness/verification/reference.py": ("proofs/test_terms_verdict.py",),
     "harness/verification/judge.py": ("proofs/test_terms_verdict.py", "harness/test_judge.py"),
-    "problems/stiffness/dense.py": ("proofs/test_definite.py",),
-    "problems/stiffness/banded.py": ("proofs/test_definite.py",),
+    "problems/stiffness/dense_block.py": ("proofs/test_definite.py",),
+    "problems/stiffness/banded_block.py": ("proofs/test_definite.py",),
     "problems/stiffness/cholmod.py": ("proofs/test_definite.py",),
     "problems/stiffness/superlu.py": ("proofs/test_definite.py",),
     "problems/stiffness/__init__.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "problems/stiffness/operator.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "harness/placement/session.py": ("harness/test_place.py",),
     "harness/placement/search.py": ("harness/test_search.py", "harness/test_place.py"),
-    "harness/placement/fresh.py": ("harness/test_place.py",),
-    "problems/input/entries.py": ("problems/test_entries.py", "problems/test_formats.py"),
-    "solvers/algorithms/sweeps.py": (
+    "harness/placement/fresh_cases.py": ("harness/test_place.py",),
+    "problems/input/matrix_entries.py": ("problems/test_entries.py", "problems/test_formats.py"),
+    "solvers/algorithms/newton_sweeps.py": (
         "solvers/test_sweeps.py",
         "problems/test_outside.py",
         "proofs/test_fuzz_exact.py",

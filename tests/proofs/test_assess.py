@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.linalg as sla
-from small import make_load, make_prepared, solve_by_nnls
+from small_problems import make_load, make_prepared, solve_by_nnls
 
 from harness.verification.assess import assess
 from harness.verification.reference import best_of_candidates, proof_of

@@ -12,15 +12,15 @@ import pytest
 import scipy.sparse as sp
 from sparse_matrices import band_matrix, chain, graph_matrix
 
-from harness.verification import balanced
-from harness.verification.balanced import independence, smallest_eigenvalue
+from harness.verification import balanced_units
+from harness.verification.balanced_units import independence, smallest_eigenvalue
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness import U, gamma
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.cholmod import Cholmod
-from problems.stiffness.dense import DenseBlock
+from problems.stiffness.dense_block import DenseBlock
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.sparse import GeneralBlock, sparse_block
+from problems.stiffness.sparse_block import GeneralBlock, sparse_block
 from problems.stiffness.superlu import SuperLU
 
 KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array])
@@ -175,7 +175,7 @@ def test_independence_of_contacts() -> None:
 
 
 def test_independence_counts_the_rounding_of_long_sums(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(balanced, "SHARE", 1 - 2.0**-50)  # so that nothing else is left to spare
+    monkeypatch.setattr(balanced_units, "SHARE", 1 - 2.0**-50)  # so that nothing else is left to spare
     for entry in (0.1, 0.7, 1.1):
         found = independence(sp.csc_array(np.full((4096, 1), entry)))
         assert 0 < Fraction(found) <= 4096 * Fraction(entry) ** 2

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from exact_answer import exactly
 
 from harness.verification import enclosure
-from harness.verification.balanced import Balanced
+from harness.verification.balanced_units import Balanced
 from harness.verification.enclosure import DoubleDouble, Enclosure, Residual, length, two_sum
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from exact_draws import LOADS, ExactLoad, ExactProblem, exact_problem
-from long import Log, draws
-from solving import TOLERANCES, promised, promises
+from sample_size import Log, draws
+from solver_forms import TOLERANCES, promised, promises
 
 from harness import InputError, own_matrices, solve_dual
 from harness.solving.session import SolverSession

@@ -7,8 +7,8 @@ import numpy as np
 from exact_answer import exact_optimum
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from long import ASKED as LONG
-from solving import CASES, IN_HOUSE, allowed, solve
+from sample_size import ASKED as LONG
+from solver_forms import CASES, IN_HOUSE, allowed, solve
 
 from harness.conformance.known_problems import contact_rows, stiffness
 from harness.verification.reference import best_of_candidates

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from exact_answer import exact_solution
-from joints import make_joint, make_scene
-from small import make_load, make_prepared
+from small_joints import make_joint, make_scene
+from small_problems import make_load, make_prepared
 
 from harness.conformance.known_problems import contact_rows
-from harness.measurement.row import _why_not_judged
+from harness.measurement.task import _why_not_judged
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
 from harness.solving import session

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small import make_load, make_prepared, solve_by_nnls
-from solving import CASES, SLOW, TESTED, TOLERANCES
+from small_problems import make_load, make_prepared, solve_by_nnls
+from solver_forms import CASES, SLOW, TESTED, TOLERANCES
 
 from harness.solving.session import SolverSession
 from harness.verification.reference import reference
@@ -15,8 +15,8 @@ from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
-from problems.forms.units import Units
-from problems.scene import read_scene
+from problems.forms.solver_units import Units
+from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.adapter import gap_tolerance
 from solvers.base import Answer, Form, Solver

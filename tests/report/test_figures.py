@@ -11,7 +11,7 @@ from synthetic_results import results, row
 
 from problems.ladders import ladders
 from report.figures import style
-from report.figures.maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
+from report.figures.junction_maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
 from report.sections.ladders import COUNTED, ladder_map, with_outcomes
 from solvers.registry import modules, owner_of
 

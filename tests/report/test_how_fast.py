@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from synthetic_results import results, row
 
-from report.sections import roads
-from report.sections.roads import FROM_SCENE, ONE_MORE, in_series, ours_and_others
+from report.sections import time_to_solution
+from report.sections.time_to_solution import FROM_SCENE, ONE_MORE, in_series, ours_and_others
 
 #: solver, form, owner, seconds to solve on scenes 0 and 1; None: outside the limit.
 LINES: list[tuple[str, str, str, tuple[float | None, float | None]]] = [
@@ -54,7 +54,7 @@ def test_the_fastest_of_each_owner_scene_by_scene(tmp_path: Path) -> None:
 
 def test_what_no_library_solves_counts_as_more(tmp_path: Path) -> None:
     made = [r | ({"verdict": "outside"} if r["owner"] == "library" else {}) for r in rows()]
-    section = roads.how_fast(results(tmp_path, made, *PROBLEMS))
+    section = time_to_solution.how_fast(results(tmp_path, made, *PROBLEMS))
     assert section is not None
     (text,) = (block.markdown for block in section.blocks)
     assert "more × (–)" in text
@@ -82,4 +82,4 @@ def test_a_case_of_a_series_with_its_proof_is_compared_with_later_cases(tmp_path
     )
     assert (line["library"], line["textbook"]) == (pytest.approx(20.0), pytest.approx(10.0))
     without = in_series(rows[rows["owner"] == "library"], proven)
-    assert " – |" in roads.how_fast_table(without).markdown
+    assert " – |" in time_to_solution.how_fast_table(without).markdown

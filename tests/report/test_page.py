@@ -19,10 +19,10 @@ from report.page.answer import headline
 from report.page.run import run_data
 from report.page.write import packed, write
 from report.results.reader import read
-from report.results.series import QUANTILES, quantile_maps
-from report.results.series import read as read_series
-from report.writers import comparison
-from report.writers.series import write as write_series
+from report.results.series_results import QUANTILES, quantile_maps
+from report.results.series_results import read as read_series
+from report.writers import comparison_report
+from report.writers.series_report import write as write_series
 
 PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 DIRECTORIES = sorted(path.parent for path in PUBLISHED.glob("*/measurements.jsonl"))
@@ -207,7 +207,7 @@ def test_the_banners_name_the_code(tmp_path: Path) -> None:
     assert "uncommitted" in answer._banner([record | {"clean": False}])["warnings"][0]
     assert answer._banner([{"method": "newton"}])["commits"] == "not recorded"
     rows = pd.DataFrame([record | {"clean": True, "side": "old"}, record | {"clean": False, "side": "new"}])
-    both = comparison._banner(rows.assign(machine=["CPU", "other"]))
+    both = comparison_report._banner(rows.assign(machine=["CPU", "other"]))
     assert "old: " + "a" * 40 in both["commits"]
     assert [warning.split()[-2] for warning in both["warnings"]] == ["uncommitted", "machine"], both
 

@@ -17,7 +17,7 @@ from report.document.numbers import significant
 from report.results.reader import Results, read
 from report.sections.speed import contacts
 from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard, summary
-from report.writers.markdown import write
+from report.writers.suite_report import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
 

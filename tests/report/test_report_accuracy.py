@@ -11,7 +11,7 @@ from report.analysis.standings import best_tolerances, fastest_first, swept, wit
 from report.document.blocks import Figure
 from report.results.reader import Results
 from report.sections import accuracy, summary
-from report.writers.markdown import write
+from report.writers.suite_report import write
 
 
 def changed(rows: list[dict[str, Any]], solver: str, **figures: Any) -> list[dict[str, Any]]:

@@ -8,8 +8,8 @@ import pytest
 from synthetic_results import no_answer, results, row, shown, table, write_rows
 
 from report.document.blocks import Figure, Section
-from report.sections import drawn as drawn_scenes
-from report.writers.markdown import write
+from report.sections import random_scenes as drawn_scenes
+from report.writers.suite_report import write
 
 SECONDS = {
     **{("newton", "dual"): 0.05, ("mprgp", "dual"): 0.1},

@@ -21,7 +21,7 @@ from report.sections.ladders import (
     WRONG_UNCLAIMED,
     rungs_in_order,
 )
-from report.writers.markdown import write
+from report.writers.suite_report import write
 
 EASY, MIDDLE, HARD, ODD = "hard/steep/1e1", "hard/steep/1e5", "hard/steep/1e9", "hard/odd/one"
 WRONG = {"verdict": "outside", "displacement_error_mm": 3e-3, "limit_mm": 1e-6}

@@ -12,7 +12,7 @@ from report.analysis.checks import warnings
 from report.figures import style
 from report.results.reader import read
 from report.results.rows import in_order
-from report.writers.markdown import write
+from report.writers.suite_report import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
 

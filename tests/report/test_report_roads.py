@@ -9,11 +9,11 @@ from synthetic_results import no_answer, results, row, table
 
 from harness.results import schema
 from problems import forms
-from report.analysis.roads import roads
+from report.analysis.time_to_solution import roads
 from report.results.reader import Results
 from report.sections import summary
-from report.sections.roads import section as from_scene
-from report.writers.markdown import write
+from report.sections.time_to_solution import section as from_scene
+from report.writers.suite_report import write
 
 LOW, HIGH = "4386/0107", "4386/1471"
 BUILD = {"condensation": 8.0, "ties": 0.5, "cholesky": 1.0, "condition": 100.0, "Q": 2.0}

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import linregress
 from synthetic_results import no_answer, results, row, shown, table
 
-from report.analysis.roads import exponent
+from report.analysis.time_to_solution import exponent
 from report.figures import style
 from report.sections import speed
 

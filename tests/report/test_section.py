@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from report.figures.deformed import deformed_figure
-from report.figures.section import section_figure
-from report.writers.pdf import LETTERS, write_pdf
+from report.figures.deformed_faces import deformed_figure
+from report.figures.gap_section import section_figure
+from report.writers.answer_pdf import LETTERS, write_pdf
 
 X, Y = np.linspace(0.0, 60.0, 7), np.linspace(0.0, 20.0, 3)
 PAIRS = [{"pair": ["a", "b"], "start": 0, "stop": 21}, {"pair": ["b", "tool"], "start": 21, "stop": 42}]

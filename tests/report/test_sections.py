@@ -13,8 +13,8 @@ from synthetic_results import everything, no_answer, results, row, write_rows
 
 from report.document.blocks import WIDEST, Table, number
 from report.results.reader import read
-from report.sections import SECTIONS, accuracy, drawn, roads, speed, summary
-from report.writers.markdown import contents, write
+from report.sections import SECTIONS, accuracy, random_scenes, speed, summary, time_to_solution
+from report.writers.suite_report import contents, write
 
 LOW, HIGH = "4386/0100", "4386/1000"
 SWEEP = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
@@ -48,10 +48,16 @@ def test_no_section_is_made_of_nothing(tmp_path: Path, section: Any) -> None:
         (speed.machine, [row(LOW, "newton")]),  # without benchmarks
         (summary.advice, [row(LOW, "a"), row(HIGH, "a")]),  # one method alone
         (speed.methods, [COUNTED, row(LOW, "piqp")]),  # one that counts is no comparison
-        (roads.section, [FORMS["dual"], FORMS["primal"]]),  # it takes dense and sparse forms,
-        (roads.section, [FORMS["sparse"]]),
-        (roads.section, [FORMS["dual"], FORMS["sparse"] | {"case": 3}]),  # no case of a series, which has
-        (roads.section, [FORMS["dual"], FORMS["sparse"] | {"status": "unsupported"}]),  # paid nothing
+        (time_to_solution.section, [FORMS["dual"], FORMS["primal"]]),  # it takes dense and sparse forms,
+        (time_to_solution.section, [FORMS["sparse"]]),
+        (
+            time_to_solution.section,
+            [FORMS["dual"], FORMS["sparse"] | {"case": 3}],
+        ),  # no case of a series, which has
+        (
+            time_to_solution.section,
+            [FORMS["dual"], FORMS["sparse"] | {"status": "unsupported"}],
+        ),  # paid nothing
     ],
 )
 def test_without_its_rows_there_is_no_section(tmp_path: Path, section: Any, rows: list[Any]) -> None:
@@ -60,7 +66,7 @@ def test_without_its_rows_there_is_no_section(tmp_path: Path, section: Any, rows
 
 def test_scenes_ladders_and_drawn_scenes_have_sections_of_their_own(tmp_path: Path) -> None:
     found = results(tmp_path, [row(LOW, "a")])
-    assert drawn.section(found.about("drawn")) is None
+    assert random_scenes.section(found.about("drawn")) is None
     assert found.about("ladders").rows.empty
     text = write(write_rows(tmp_path / "failed", [row(LOW, "a", **no_answer("crashed"))])).read_text("utf-8")
     titles = ["Summary", "Every solver on every scene", "Machine and method"]

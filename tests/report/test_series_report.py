@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from harness.results import series_file
-from report.results.series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
-from report.writers.series import _swept, write
+from report.results.series_results import QUANTILES, Series, convergence, exceedance, quantile_maps, read
+from report.writers.series_report import _swept, write
 
 CASES, M = 240, 12
 IDENTITY = {"solver": "newton", "form": "dual", "tolerance": 1e-11}
@@ -48,7 +48,7 @@ def made(directory: Path, swept: bool = False, name: str = "made") -> np.ndarray
 @pytest.mark.parametrize("at_once", [1, 1000, 2**22])
 def test_maps_and_exceedance_in_pieces(at_once: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gaps = made(tmp_path)
-    monkeypatch.setattr("report.results.series.AT_ONCE", at_once)
+    monkeypatch.setattr("report.results.series_results.AT_ONCE", at_once)
     series = read(tmp_path)
     assert series.counts == {"within": CASES - 1, "no_answer": 1}
     maps = quantile_maps(series)

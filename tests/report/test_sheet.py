@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from report.figures import style
-from report.figures.answer import answer_figures
+from report.figures.answer_maps import answer_figures
 
 KINDS = ("fasteners", "installed_fasteners", "clamps")
 

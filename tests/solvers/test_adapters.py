@@ -7,8 +7,8 @@ import pytest
 import qpsolvers
 import scipy.linalg as sla
 from proxsuite import proxqp
-from small import make_load, make_prepared, make_strips, solve_by_nnls
-from solving import TESTED
+from small_problems import make_load, make_prepared, make_strips, solve_by_nnls
+from solver_forms import TESTED
 
 from harness.conformance.check import run
 from harness.solving.session import SolverSession

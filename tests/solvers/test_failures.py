@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small import make_load, make_strips
-from solving import IN_HOUSE
+from small_problems import make_load, make_strips
+from solver_forms import IN_HOUSE
 
 from harness.solving.session import SolverSession
 from problems.forms.assembly import Assembly, LoadCase

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small import by_nnls, definite, make_load, make_prepared, solve_by_nnls
+from small_problems import by_nnls, definite, make_load, make_prepared, solve_by_nnls
 
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared

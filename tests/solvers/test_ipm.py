@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from long import ASKED
-from small import by_nnls, definite, make_load, make_prepared, solve_by_nnls
+from sample_size import ASKED
+from small_problems import by_nnls, definite, make_load, make_prepared, solve_by_nnls
 
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small import make_load, make_strips, solve_by_nnls
+from small_problems import make_load, make_strips, solve_by_nnls
 
 from problems.forms import compliance
 from problems.forms.assembly import LoadCase, Vector

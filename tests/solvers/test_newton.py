@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from small import by_nnls, definite
+from small_problems import by_nnls, definite
 
-from problems.stiffness.dense import product
+from problems.stiffness.dense_block import product
 from solvers.algorithms.block_pivoting import MAX_STALE_PASSES, _towards, block_pivoting, forces_on
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import scipy.linalg as sla
-from long import seeds
-from small import definite
+from sample_size import seeds
+from small_problems import definite
 
 from solvers.algorithms.newton_system import conjugate_gradients
 from solvers.algorithms.preconditioner import (

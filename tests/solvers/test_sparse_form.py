@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.optimize import isotonic_regression
-from small import make_load, make_prepared, make_strips, solve_by_nnls
+from small_problems import make_load, make_prepared, make_strips, solve_by_nnls
 from sparse_matrices import band_matrix, graph_matrix
 from test_matrices import write_mtx
 
@@ -19,10 +19,10 @@ from problems.forms import compliance
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.scene import read_scene, scene_names
-from problems.stiffness.banded import BandedBlock
+from problems.scene_files import read_scene, scene_names
+from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.sparse import GeneralBlock
+from problems.stiffness.sparse_block import GeneralBlock
 from solvers.base import Answer
 from solvers.registry import make_solver
 

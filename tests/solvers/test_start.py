@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from small import definite, make_load, make_prepared
+from small_problems import definite, make_load, make_prepared
 
 from solvers.algorithms.interior_point import NoStart, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
 

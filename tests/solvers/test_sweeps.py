@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from joints import two_parts
-from small import definite, make_load, make_prepared, solve_by_nnls
-from strip import write_strip
+from small_joints import two_parts
+from small_problems import definite, make_load, make_prepared, solve_by_nnls
+from strip_scene import write_strip
 
 from harness.conformance.known_problems import contact_rows
 from harness.solving.session import SolverSession
@@ -21,11 +21,11 @@ from problems.forms.prepared import Prepared, dual_alone
 from problems.forms.problem import in_form
 from problems.ladders import make_rung
 from problems.load_cases.random_gaps import random_gaps
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
-from solvers.algorithms import sweeps
+from solvers.algorithms import newton_sweeps
 from solvers.algorithms.contact_sets import OpenFactor
-from solvers.algorithms.sweeps import Sweeps
+from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import Answer, WarmStart
 from solvers.kkt import with_p
 from solvers.registry import make_solver
@@ -309,7 +309,7 @@ def test_where_exchanges_circle_the_sets_settle(seed: int) -> None:
 
 def test_unsettled_forces_are_cut_at_zero_and_judged_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     Q, p = decaying(), np.random.default_rng(3).standard_normal(LINES * ACROSS)
-    monkeypatch.setattr(sweeps, "MAX_SWEEPS", 2)
+    monkeypatch.setattr(newton_sweeps, "MAX_SWEEPS", 2)
     own = Sweeps(dual_alone(Q))
     case = own.solved(LoadCase(p * 0, -p, p), TOLERANCE)
     assert not case.settled

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small import make_load, make_prepared, make_strips, solve_by_nnls
+from small_problems import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.verification.judge import conditioned_limit
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from solvers.base import Answer, WarmStart
 from solvers.registry import make_solver
 

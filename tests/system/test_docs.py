@@ -20,7 +20,7 @@ from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.formats import FORMATS
 from problems.model.effect import effect_class, effect_kinds
-from problems.scene import SCENES, read_scene
+from problems.scene_files import SCENES, read_scene
 from solvers.plugin import load_plugin
 
 ROOT = Path(__file__).parents[2]

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from joints import two_parts
+from small_joints import two_parts
 from test_page_browser import chromium  # noqa: F401
 
 from harness import solve
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 pytest.importorskip("bokeh")
 pytestmark = pytest.mark.slow

@@ -15,7 +15,7 @@ import pytest
 from harness.planning.plan import DECADES, expand
 from harness.planning.suite import read_written
 from harness.results.schema import STATUSES, STEPS
-from problems.drawn import SIZES
+from problems.random_scenes import SIZES
 from solvers.registry import make_solver, modules, owner_of
 from studies.publish import NAMES, PUBLISHED
 

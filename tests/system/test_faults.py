@@ -8,11 +8,11 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-import tiny
+import tiny_joint
 from rich.console import Console
-from runs import rows_of, wait_for
+from suite_runs import rows_of, wait_for
 
-from harness.measurement.run import run
+from harness.measurement.suite_run import run
 from harness.planning.suite import read_suite
 from harness.results import records
 
@@ -24,8 +24,8 @@ ROOT = Path(__file__).parents[2]
 def suite_of(folder: Path, rows: int) -> Path:
     """A suite of so many measurements."""
     entry = '[[solver]]\nname = "faulty"\nvariant = "{}"\noptions = {{fault = "gives_up"}}\n'
-    path = tiny.write_suite(folder, "".join(map(entry.format, range(rows))), plugin="faulty.py")
-    (folder / "faulty.py").write_text(tiny.FAULTY)
+    path = tiny_joint.write_suite(folder, "".join(map(entry.format, range(rows))), plugin="faulty.py")
+    (folder / "faulty.py").write_text(tiny_joint.FAULTY)
     return path
 
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 from edge_draws import OUTCOMES, Draw, abaqus, dmig, encoded, matrix_market, npz, op4, table
-from long import Fault, Log, draws
 from rich.console import Console
+from sample_size import Fault, Log, draws
 from scipy.interpolate import RegularGridInterpolator
-from small import by_nnls
+from small_problems import by_nnls
 
 from harness.api import load_scene, own_matrices, random_gaps, solve
 from harness.scene.export import import_

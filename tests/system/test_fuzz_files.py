@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from hostile_draws import mutate
 from hostile_targets import Target, all_targets, invoke
-from long import Fault, Log, draws
 from matplotlib.figure import Figure
+from sample_size import Fault, Log, draws
 
 SEED = 17
 TIME_LIMIT_S = 60  # per command

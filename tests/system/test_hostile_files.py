@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from commands import harness
 from rich.console import Console
-from small import make_load, make_prepared
+from small_problems import make_load, make_prepared
 
 from harness.scene.export import import_, matrices
 from problems import formats

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import harness
-from joints import two_parts
+from small_joints import two_parts
 
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.suite import read_suite
 from problems.errors import InputError
 from problems.load_cases.sweep import sweep
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
 SCENE = f"""
 title = "TITLE"

@@ -10,15 +10,15 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-import tiny
+import tiny_joint
 from rich.console import Console
-from runs import all_end, heed_interrupts, processes, rows_of, wait_for
+from suite_runs import all_end, heed_interrupts, processes, rows_of, wait_for
 
 import harness.conformance.isolated as isolated
-import harness.measurement.describe as describing
+import harness.measurement.solver_descriptions as describing
 import harness.terminal.console as waiting_module
 from harness import InputError
-from harness.measurement.describe import describe, described
+from harness.measurement.solver_descriptions import describe, described
 from harness.planning.suite import read_suite
 
 pytestmark = pytest.mark.slow
@@ -96,7 +96,7 @@ def test_check_says_how_a_solver_ended_or_that_it_did_not(tmp_path: Path, in_sol
 )
 def test_an_import_that_ends_the_process_is_bad_input(tmp_path: Path, at_import: str, said: str) -> None:
     plugin = write(tmp_path, at_import)
-    suite = tiny.write_suite(tmp_path)
+    suite = tiny_joint.write_suite(tmp_path)
     for arguments in (("check",), ("run", suite, "--solver", "mine", "--out", tmp_path / "out")):
         done = harness(tmp_path, *arguments, "--plugin", plugin)
         assert done.returncode == 2
@@ -106,7 +106,7 @@ def test_an_import_that_ends_the_process_is_bad_input(tmp_path: Path, at_import:
 
 def test_an_endless_import_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plugin = write(tmp_path, "time.sleep(100)")
-    suite = tiny.write_suite(tmp_path, '[[solver]]\nname = "mine"\n', plugin=str(plugin))
+    suite = tiny_joint.write_suite(tmp_path, '[[solver]]\nname = "mine"\n', plugin=str(plugin))
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(describing, "IMPORT_S", 1.0)
     monkeypatch.setattr(isolated, "IMPORT_S", 1.0)
@@ -130,14 +130,14 @@ def test_threads_forks_and_exit_handlers_are_left_behind_by_no_command(
     plugin = write(tmp_path, at_import, in_solve)
     done = harness(tmp_path, "check", "--plugin", plugin, "--time-limit", 20)
     assert (done.returncode, done.stdout) == (0, "mine: no faults\n")
-    suite = tiny.write_suite(tmp_path)
+    suite = tiny_joint.write_suite(tmp_path)
     done = harness(tmp_path, "run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
     assert done.returncode == 0
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
 def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(tiny.EXACT.replace('("dual",)', '"dual"'))
+    (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
     with pytest.raises(InputError, match="solver mine: forms"):
         described([("mine", {})], tmp_path / "mine.py", "test")
 
@@ -169,7 +169,7 @@ def test_an_interrupt_ends_within_a_second(tmp_path: Path, what: str) -> None:
     """While a solver sleeps in `check`, and while `run` waits for an import."""
     go = tmp_path / "begun"
     begin = f"open({str(go)!r}, 'w'); time.sleep(60)"
-    suite = tiny.write_suite(tmp_path)
+    suite = tiny_joint.write_suite(tmp_path)
     plugin = write(tmp_path, *(("", begin) if what == "check" else (begin,)))
     arguments = [] if what == "check" else [suite, "--solver", "mine", "--out", tmp_path / "out"]
     interrupt(command(what, *arguments, "--plugin", plugin), tmp_path, go, signal.SIGINT)
@@ -202,7 +202,7 @@ def test_a_run_goes_on_after_a_solver_that_breaks_the_contract(tmp_path: Path) -
     entry = '[[solver]]\nname = "mine"\nvariant = "{}"\noptions = {{ what = "{}" }}\n'
     text = "".join(entry.format(k, what) for k, what in enumerate(BREACHES))
     done = harness(
-        tmp_path, "run", tiny.write_suite(tmp_path, text, plugin="mine.py"), "--out", tmp_path / "out"
+        tmp_path, "run", tiny_joint.write_suite(tmp_path, text, plugin="mine.py"), "--out", tmp_path / "out"
     )
     rows = rows_of(tmp_path / "out")
     assert done.returncode == 3

@@ -23,10 +23,10 @@ from harness.results.records import to_line
 from harness.terminal.console import PlainConsole
 from report.document import escape
 from report.figures import style
-from report.figures.answer import answer_figures
-from report.writers.markdown import write
-from report.writers.series import write as write_series
-from report.writers.solution import write as write_solution
+from report.figures.answer_maps import answer_figures
+from report.writers.answer_report import write as write_solution
+from report.writers.series_report import write as write_series
+from report.writers.suite_report import write
 
 HOSTILE = "<b>x</b>|![i](http://e)`c`$a_b$ *e*\n# h\x1b[31m\u202e\ud800"
 LITERAL = r"&lt;b&gt;x&lt;/b&gt;\|\!\[i\](http://e)&#96;c&#96;\$a_b\$ \*e\* \# h�\[31m��"

@@ -20,9 +20,9 @@ from test_series_report import made as made_series
 from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
-from report.results.series import read as read_series
-from report.writers.series import write as write_series
-from report.writers.solution import write as write_solution
+from report.results.series_results import read as read_series
+from report.writers.answer_report import write as write_solution
+from report.writers.series_report import write as write_series
 
 pytestmark = pytest.mark.slow
 FLAGS = (

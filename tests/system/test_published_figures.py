@@ -11,7 +11,7 @@ from report.document.blocks import Table
 from report.document.numbers import listed, power, significant, tidy_power
 from report.results.reader import Results, read
 from report.sections import speed
-from report.sections.series import compared
+from report.sections.series_throughput import compared
 from solvers.registry import modules
 from studies.publish import NAMES, PUBLISHED, SERIES, minutes, rows_of, write_index
 

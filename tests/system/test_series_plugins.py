@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 from commands import harness
-from runs import all_end
-from strip import write_strip
+from strip_scene import write_strip
+from suite_runs import all_end
 from test_hostile_plugins import command, interrupt, write
 from test_hostile_plugins import harness as outside
 
@@ -23,7 +23,7 @@ MORE_MEMORY = "held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(
 def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A cache that marks the processes of a test, which are to end; no report, whose pictures take long."""
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
     yield
     assert all_end(tmp_path / "cache")
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from long import draws
-from small import make_load, make_prepared
+from sample_size import draws
+from small_problems import make_load, make_prepared
 
 import harness
 from harness import LoadCase

@@ -45,9 +45,9 @@ def make_scene(joint: Joint, *effects: Effect) -> JointScene:
 def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:
     """From here on every matrix has to come from the cache."""
     for stage in (
-        "model.condense.condense",
-        "stiffness.dense.cholesky",
-        "stiffness.dense.DenseBlock.compliance",
+        "model.condensation.condense",
+        "stiffness.dense_block.cholesky",
+        "stiffness.dense_block.DenseBlock.compliance",
     ):
         monkeypatch.setattr(f"problems.{stage}", lambda *_: pytest.fail("built a second time"))
 

@@ -22,10 +22,10 @@ from scipy.linalg import blas, lapack
 from problems import storage
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
-from problems.stiffness.dense import mirrored
+from problems.stiffness.dense_block import mirrored
 from problems.storage import fingerprint
 
-from .numbering import lines_across
+from .banded_numbering import lines_across
 from .part import PartLoadEffect, PartModel
 
 #: The folders whose code makes a part's stiffness.

@@ -17,9 +17,9 @@ from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
 from problems.forms.problem import in_form
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
-from .describe import Description
+from .solver_descriptions import Description
 from .worker import measure
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from problems import storage
 from problems.errors import InputError
-from problems.stiffness import dense, operator
+from problems.stiffness import dense_block, operator
 from problems.stiffness.block import Block, NotPositiveDefinite
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
@@ -86,8 +86,8 @@ class DensePrepared(Prepared):
         progress: Progress,
     ) -> None:
         super().__init__(replace(assembly, K=Stiffness(assembly.K.blocks, self._open_factors)))
-        self.blocks, A = [b for b in assembly.K.blocks if isinstance(b, dense.DenseBlock)], assembly.A
-        code = fingerprint([Path(__file__), Path(dense.__file__), Path(operator.__file__)])
+        self.blocks, A = [b for b in assembly.K.blocks if isinstance(b, dense_block.DenseBlock)], assembly.A
+        code = fingerprint([Path(__file__), Path(dense_block.__file__), Path(operator.__file__)])
         self.factors_key = storage.digest("factors", key, code)
         parts = (A.data, A.indices, A.indptr)
         self.key = storage.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))

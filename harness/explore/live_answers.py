@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.placement.candidates import movable_fasteners
-from harness.scene.edited import MOVED, of_kind, with_fasteners
+from harness.scene.scene_file import MOVED, of_kind, with_fasteners
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
@@ -25,10 +25,10 @@ from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
-from problems.input.bounded import validation_faults
+from problems.input.bounded_types import validation_faults
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
-from solvers.algorithms.sweeps import Sweeps
+from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import WarmStart
 from solvers.kkt import with_p
 

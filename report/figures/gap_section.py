@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from report.document.numbers import significant
 
 from . import style
-from .maps import Array, grid_of
+from .junction_maps import Array, grid_of
 
 
 def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure | None:

@@ -24,7 +24,7 @@ import psutil
 
 from harness.results.records import Row
 
-from .child import end_children
+from .child_process import end_children
 
 ROOT = Path(__file__).parents[2]
 POLL_S = 0.05
@@ -82,7 +82,7 @@ class Monitored:
         events, events_of_child = os.pipe()
         try:
             self.process = subprocess.Popen(
-                [python, "-P", "-m", "harness.measurement.child", function.__qualname__],
+                [python, "-P", "-m", "harness.measurement.child_process", function.__qualname__],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,

@@ -13,14 +13,14 @@ import pandas as pd
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.escape import csv_frame
 from report.document.numbers import significant
-from report.figures.answer import answer_figures
-from report.figures.maps import grid_of
+from report.figures.answer_maps import answer_figures
+from report.figures.junction_maps import grid_of
 from report.page.answer import answer_data, facts, headline
 from report.page.write import write as write_page
-from report.results.answers import contacts, fasteners, nodes, pair_name, read
-from report.results.series import Array
-from report.writers.pages import written
-from report.writers.pdf import write_pdf
+from report.results.answer_record import contacts, fasteners, nodes, pair_name, read
+from report.results.series_results import Array
+from report.writers.answer_pdf import write_pdf
+from report.writers.sections_writer import written
 
 CAPTIONS = {
     "section": "*A section through the largest gap*, its height exaggerated: the faces of the parts.",

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from harness.measurement.child import Events
-from harness.measurement.monitored import Monitored
+from harness.measurement.child_process import Events
+from harness.measurement.monitored_call import Monitored
 from harness.measurement.scheduler import done_as_completed, workers
 from harness.measurement.worker import START_S
 from harness.results.provenance import provenance
 from harness.results.records import Row
-from harness.solving.answers import StoredFiles
-from harness.solving.turns import in_turn
+from harness.solving.call_lock import in_turn
+from harness.solving.solver_answer import StoredFiles
 from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError

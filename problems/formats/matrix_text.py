@@ -16,7 +16,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.input.entries import from_entries, mirrored, one_sided, read_entries
+from problems.input.matrix_entries import from_entries, mirrored, one_sided, read_entries
 from problems.input.matrix_files import BANNER, MIB, Choose, read_mtx
 from problems.input.text_files import read_bytes
 

@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from problems.drawn import EXAMPLES, drawn_table
-from problems.input.bounded import resolved, unknown, validation_faults
+from problems.input.bounded_types import resolved, unknown, validation_faults
 from problems.input.text_files import read_text
 from problems.ladders import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
@@ -31,6 +30,7 @@ from problems.model.effect_tables import EffectTable
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MatricesScene, Scene
+from problems.random_scenes import EXAMPLES, drawn_table
 
 from .errors import BACKSLASH, Fault, InputError
 

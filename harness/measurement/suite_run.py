@@ -13,9 +13,9 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.planning.due import due, predicted_timeout, stopped_at
 from harness.planning.plan import Measurement, expand, of_key, with_key
 from harness.planning.suite import Suite, to_toml
+from harness.planning.tolerance_search import due, predicted_timeout, stopped_at
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
@@ -29,11 +29,11 @@ from harness.verification.reference_problem import (
 )
 from problems.forms import form_family
 from problems.forms.problem import in_form
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 
-from .describe import Description, Solvers, describe, resumed
-from .row import Task, TaskResult, rows_of, run_task, run_task_on_worker
 from .scheduler import done_as_completed, workers
+from .solver_descriptions import Description, Solvers, describe, resumed
+from .task import Task, TaskResult, rows_of, run_task, run_task_on_worker
 
 
 def run(

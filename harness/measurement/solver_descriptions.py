@@ -15,24 +15,24 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.planning.due import OUT_OF_TIME
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
+from harness.planning.tolerance_search import OUT_OF_TIME
 from harness.results import records
-from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
-from harness.solving.answers import shown
+from harness.results.row_validation import refuse_wrong_kinds
+from harness.solving.solver_answer import shown
 from problems.errors import Fault, InputError
 from problems.forms import FORMS, default_form
-from problems.scene import read_scene
+from problems.scene_files import read_scene
 from problems.storage import ROOT, fingerprint
 from solvers.base import Form, Solver
 from solvers.plugin import own_files
 from solvers.registry import make_solver, owner_of, solver_version
 
-from .child import Events
+from .child_process import Events
 from .environments import interpreter, refuse_other_copies
-from .monitored import Monitored
+from .monitored_call import Monitored
 
 IMPORT_S = 60.0  # for the imports of all the solvers
 IMPORT_MIB = 8192

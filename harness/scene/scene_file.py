@@ -9,11 +9,11 @@ from typing import Any
 
 import tomlkit
 
-from problems.drawn import drawn_table
 from problems.errors import InputError
 from problems.input.text_files import read_text
 from problems.load_cases.random_gaps import RandomGaps
-from problems.scene import SCENES, TOML_MIB, assembly_path, read_toml
+from problems.random_scenes import drawn_table
+from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_toml
 
 MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes")  # keys whose values may be paths, as seen from the file

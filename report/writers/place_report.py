@@ -15,9 +15,9 @@ from report.document.blocks import Block, Column, Figure, Section, Table, Text, 
 from report.document.escape import quoted
 from report.document.numbers import counted, significant, whole
 from report.figures import style
-from report.figures.maps import Map, drawn, rooted
-from report.results.series import read as read_series
-from report.writers.pages import emptied, written
+from report.figures.junction_maps import Map, drawn, rooted
+from report.results.series_results import read as read_series
+from report.writers.sections_writer import emptied, written
 
 #: How a plan came about: what a line of the table and of the picture is called, and its look.
 FAMILIES = {

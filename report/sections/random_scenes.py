@@ -11,7 +11,7 @@ from report.analysis.standings import best_tolerances, shown
 from report.document.blocks import Block, Column, Figure, Section, Table, number, word
 from report.document.numbers import power, whole
 from report.figures import style
-from report.figures.lines import against_contacts, entries, styles_of
+from report.figures.line_charts import against_contacts, entries, styles_of
 from report.results.reader import Results
 from report.results.rows import in_order
 

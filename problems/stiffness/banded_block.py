@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import blas
 
 from . import Indices, Matrix, U, Vector, gamma
-from .band import band_blocks, band_cholesky, band_solve, lower_band
+from .band_factor import band_blocks, band_cholesky, band_solve, lower_band
 from .block import NotPositiveDefinite, SparseBlock, scaled
 from .selected_inverse import BlockPart
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 from . import Indices, Matrix, U, Vector
-from .band import half_bandwidth
-from .banded import BandedBlock
+from .band_factor import half_bandwidth
+from .banded_block import BandedBlock
 from .block import NotPositiveDefinite, SparseBlock, scaled
 from .superlu import SuperLU, moving_unknown
 

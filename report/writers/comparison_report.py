@@ -16,7 +16,7 @@ from report.document.escape import csv_frame, file_name
 from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
 from report.page.write import Data, banner
 from report.page.write import write as write_page
-from report.writers.pages import written
+from report.writers.sections_writer import written
 
 NOTE = (
     "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "

@@ -9,12 +9,12 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from report.results.answers import Answer, pair_name
+from report.results.answer_record import Answer, pair_name
 
 from . import style
-from .deformed import deformed_figure
-from .maps import CLOSED, LARGER, RIM, Array, Map, Scale, drawn, grid_of, rooted
-from .section import section_figure
+from .deformed_faces import deformed_figure
+from .gap_section import section_figure
+from .junction_maps import CLOSED, LARGER, RIM, Array, Map, Scale, drawn, grid_of, rooted
 
 
 def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from problems.errors import Fault, InputError
-from problems.input.bounded import regular_file
+from problems.input.bounded_types import regular_file
 
 from . import records
 from .records import Row

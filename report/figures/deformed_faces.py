@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from report.document.numbers import significant
-from report.results.answers import pair_name
+from report.results.answer_record import pair_name
 
 from . import style
-from .maps import Array
-from .section import around_worst
+from .gap_section import around_worst
+from .junction_maps import Array
 
 LINES = 60  # of each face, along either side
 NARROWEST, HEIGHT = 0.4, 0.35  # of the view, to its longer side

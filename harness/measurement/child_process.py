@@ -1,4 +1,4 @@
-"""A child process: its side of a monitored call (monitored.py), and how what it has started is ended.
+"""A child process: its side of a monitored call (monitored_call.py), and how what it has started is ended.
 
 The call comes pickled through stdin; events go back as JSON lines on the file descriptor that it names.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.results.records import to_line
-from harness.solving.answers import InvalidAnswer, error_text
+from harness.solving.solver_answer import InvalidAnswer, error_text
 from problems.errors import InputError
 
 TIMEOUT_S = 10.0  # for children that keep forking

@@ -13,8 +13,8 @@ from report.document.escape import plain
 from report.document.numbers import position, significant
 from report.figures import style
 from report.page.answer import facts, headline
-from report.results.answers import fasteners
-from report.results.series import Array
+from report.results.answer_record import fasteners
+from report.results.series_results import Array
 
 A4 = (8.27, 11.69)  # inches
 LEFT, WIDTH, TOP, LINE, LOWEST = 0.07, 0.86, 0.965, 0.0145, 0.03  # of the page

@@ -12,12 +12,12 @@ import pandas as pd
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.escape import csv_frame
 from report.document.numbers import significant, whole
-from report.figures.answer import gap_maps
+from report.figures.answer_maps import gap_maps
 from report.page.answer import two_answers_data
 from report.page.write import write as write_page
-from report.results.answers import Answer, contacts, fasteners, pair_name, read
-from report.results.series import Array
-from report.writers.pages import written
+from report.results.answer_record import Answer, contacts, fasteners, pair_name, read
+from report.results.series_results import Array
+from report.writers.sections_writer import written
 
 SIDES = ("first", "second")
 CAPTIONS = {

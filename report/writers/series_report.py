@@ -14,12 +14,20 @@ from report.document.blocks import Figure, Section, Table, number, word
 from report.document.escape import file_name
 from report.document.numbers import counted, significant, tidy_power
 from report.figures import style
-from report.figures.maps import Map, drawn, rooted
+from report.figures.junction_maps import Map, drawn, rooted
 from report.page.maps import series_maps
 from report.page.write import Data, banner
 from report.page.write import write as write_page
-from report.results.series import QUANTILES, Array, Series, convergence, exceedance, quantile_maps, read
-from report.writers.pages import emptied, written
+from report.results.series_results import (
+    QUANTILES,
+    Array,
+    Series,
+    convergence,
+    exceedance,
+    quantile_maps,
+    read,
+)
+from report.writers.sections_writer import emptied, written
 
 MAPPED = (0.5, 0.95, 0.99)
 PERCENT = {q: f"{100 * q:g} % quantile" for q in QUANTILES}
@@ -169,7 +177,7 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
     """What the page of a series shows.
 
     quantiles : (len(names), m), mm, the maps; curve : the exceedance over all contacts, as in
-    report.results.series.
+    report.results.series_results.
     """
     facts = series.facts
     versions = facts.get("versions") or {}

@@ -11,7 +11,7 @@ import pandas as pd
 
 from report.document.escape import quoted
 
-from .series import Array
+from .series_results import Array
 
 Answer = tuple[dict[str, Any], dict[str, Array]]
 

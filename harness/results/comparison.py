@@ -17,8 +17,8 @@ from pathlib import Path
 
 from problems.errors import Fault, InputError
 
-from .kinds import MAX_FAULTS, refuse_wrong_kinds
 from .records import MEASUREMENTS, Row, read
+from .row_validation import MAX_FAULTS, refuse_wrong_kinds
 
 #: What a comparison needs of a row.
 NEEDED = ("scene", "solver", "form", "tolerance", "status", "verdict")

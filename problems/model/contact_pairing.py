@@ -13,8 +13,8 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
-from .cells import cross
 from .surface import Surface
+from .surface_cells import cross
 
 STEPS, SETTLED = 50, 1e-10  # of the search for a foot; mm
 

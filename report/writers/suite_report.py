@@ -16,7 +16,7 @@ from report.page.write import write as write_page
 from report.results.reader import Results, read
 from report.sections import SECTIONS
 
-from .pages import emptied, written
+from .sections_writer import emptied, written
 
 LONG = 4  # sections, from which a report begins with links to them
 

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Patch
 
 from harness.results.schema import OWNERS
-from report.analysis.roads import LOAD_CASES, STAGES, roads
 from report.analysis.standings import best_tolerances, of_fastest, seconds_text
+from report.analysis.time_to_solution import LOAD_CASES, STAGES, roads
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.escape import short
 from report.document.numbers import MISSING, counted, significant, whole
@@ -21,7 +21,7 @@ from report.figures import style
 from report.results.reader import Results
 from report.results.rows import in_order
 
-from .series import compared
+from .series_throughput import compared
 
 FROM_SCENE = "a load case, from the scene on"
 ONE_MORE = "one more load case on a known assembly"
