@@ -21,4 +21,8 @@ def __getattr__(name: str) -> Any:
         api = importlib.import_module("harness.api")
         if name in ("__all__", *api.__all__):
             return getattr(api, name)
-    raise AttributeError(f"module 'harness' has no attribute {name!r}")
+    raise AttributeError(f"the public interface has no {name!r}")
+
+
+def __dir__() -> list[str]:
+    return list(__getattr__("__all__"))

@@ -15,7 +15,7 @@ from problems.errors import InputError
 
 from .base import Solver
 
-PROJECT = ("harness", "problems", "report", "solvers")
+PROJECT = ("harness", "problems", "report", "rivetbench", "solvers")
 
 
 def load_plugin(path: Path) -> type[Solver]:

@@ -11,6 +11,7 @@ from small_problems import make_load, make_prepared, solve_by_nnls
 from strip_scene import STRIP, write_strip
 
 import harness
+import rivetbench
 from harness import (
     Answer,
     InputError,
@@ -45,8 +46,10 @@ def test_the_names_are_offered_and_documented() -> None:
     for name in harness.__all__:
         assert getattr(harness, name) is getattr(api, name)
         assert getattr(harness, name).__doc__
-    with pytest.raises(AttributeError, match="no attribute 'slove'"):
-        _ = harness.slove
+        assert getattr(rivetbench, name) is getattr(api, name)
+    assert dir(rivetbench) == sorted(api.__all__)
+    with pytest.raises(AttributeError, match="no 'slove'"):
+        _ = rivetbench.slove
 
 
 def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> None:

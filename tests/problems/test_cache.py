@@ -181,7 +181,14 @@ OWN = "input.user_matrices"  # makes a user's matrices, no joint's
     "module",
     [
         *("model.plate", "model.condensation"),
-        *("model.joint", "model.part", "stiffness.dense_block", "forms.preparation_stages", "effects.supports", OWN),
+        *(
+            "model.joint",
+            "model.part",
+            "stiffness.dense_block",
+            "forms.preparation_stages",
+            "effects.supports",
+            OWN,
+        ),
     ],
 )
 def test_a_change_of_the_code_that_builds_changes_the_key(

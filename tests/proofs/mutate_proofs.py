@@ -19,7 +19,7 @@ from pathlib import Path
 from mutants import MUTANTS, TESTS, Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("harness", "problems", "solvers", "report", "tests")
+PACKAGES = ("rivetbench", "harness", "problems", "solvers", "report", "tests")
 LIMIT_S = 300.0
 
 

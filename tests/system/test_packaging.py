@@ -12,6 +12,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
+import rivetbench
+
 ROOT = Path(__file__).parents[2]
 SUFFIXES = {".toml", ".j2", ".js", ".css", ".csv"}
 LINTERS = {"ruff", "mypy", "import-linter", "pandas-stubs", "types-psutil"}
@@ -35,9 +37,18 @@ def test_the_command_is_the_module() -> None:
         for command in (
             [str(Path(sys.executable).with_name("rivetbench"))],
             [sys.executable, "-m", "harness"],
+            [sys.executable, "-m", "rivetbench"],
         )
     ]
-    assert said[0] == said[1] != ""
+    assert len(set(said)) == 1
+    assert said[0] != ""
+
+
+def test_the_package_is_imported_without_numpy() -> None:
+    """The version is there at once; the rest comes with the first name asked for."""
+    code = "import sys, rivetbench; print(rivetbench.__version__, 'numpy' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said == f"{rivetbench.__version__} False\n"
 
 
 def lower_bounds(*without: str) -> dict[str, Version]:
