@@ -70,7 +70,7 @@ def size_of(scene: Scene) -> Size | None:
             return None
     K = assembly.K.matrix
     blocks = [rows.stop - rows.start for rows in dense_slices(K)]
-    sparse = 8 * assembly.K.numbers / MIB
+    sparse = 8 * assembly.K.factor_nonzeros / MIB
     peak = PROCESS_MIB + FACTORS * sparse + BYTES_PER_ENTRY * K.nnz / MIB
     return Size(assembly.n, assembly.m, *_dense(blocks, assembly.m), sparse, peak, assembly.n)
 

@@ -233,7 +233,7 @@ def _opened(path: Path, origin: dict[str, Path]) -> ReferenceProblem:
     try:
         scene = read_scene(str(path))
         problem = opened(scene, chosen_form(scene, FORMS, None).form)
-        _ = problem.prepared.assembly.K.factors
+        problem.prepared.assembly.K.ensure_factored()
         return problem
     except InputError as error:
         raise InputError([replace(fault, where=str(origin["K"])) for fault in error.faults]) from error

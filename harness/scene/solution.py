@@ -118,7 +118,7 @@ def solve(
         said(f"In the sparse form, without condensation: {choice.why}")
     with step("matrices, loads and gaps"):
         problem = opened(scene, choice.form, progress, limit_s)
-        _ = problem.prepared.assembly.K.factors
+        problem.prepared.assembly.K.ensure_factored()
         p = problem.prepared.dual_load(problem.load)
     if np.isnan(p).any():
         largest = float(abs(problem.load.f).max(initial=0.0))

@@ -124,7 +124,7 @@ def _with_effects(table: Table, scene: JointScene) -> Table:
 
 def print_facts(name: str, assembly: Assembly, console: Console) -> None:
     """Print the sizes, and what reading has changed. Raises InputError if K is not positive definite."""
-    _ = assembly.K.factors
+    assembly.K.ensure_factored()
     blocks = ", ".join(str(K.shape[0]) for K in assembly.K.matrices)
     console.print(f"{name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
     for note in assembly.notes:

@@ -173,9 +173,9 @@ def _in_own_units(answer: Answer, units: Units) -> Answer:
 
 def protect(problem: Problem) -> None:
     """Make the arrays that the solver is given read-only."""
-    assembly, stages = problem.assembly, vars(problem.prepared)
+    assembly = problem.assembly
     factors = assembly.K.factors if assembly.K.factored else ()
-    made = [*assembly.K.arrays, *factors, stages.get("Q"), assembly.A, assembly.nodes]
+    made = [*assembly.K.arrays, *factors, problem.prepared.Q_if_made, assembly.A, assembly.nodes]
     for matrix in made:
         if sp.issparse(matrix) and matrix.data.flags.writeable:
             matrix.sum_duplicates()  # as scipy would in place, when it is first asked for |A|

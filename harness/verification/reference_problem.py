@@ -131,7 +131,7 @@ def measurable(
         allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
         raise InputError.one(source, "contacts", 0, allowed)
     progress("factors of K", 0.0)
-    _ = problem.prepared.assembly.K.factors
+    problem.prepared.assembly.K.ensure_factored()
     return problem
 
 

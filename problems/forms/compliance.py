@@ -120,7 +120,7 @@ def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> Approxim
     if few and assembly.contact_nodes is None:
         return of_dense(DenseCompliance(Q.toarray()), None)
     found = None
-    if few or windows.work <= SETS * assembly.K.work:
+    if few or windows.work <= SETS * assembly.K.factorisation_flops:
         if _single_might_do(assembly):
             with suppress(np.linalg.LinAlgError):
                 found = _from_windows(like, windows, single=True)

@@ -104,12 +104,11 @@ class DensePrepared(Prepared):
 
     @property
     def seconds(self) -> dict[str, float]:
-        Q = self._schur if "_schur" in vars(self) else storage.load(str(self.key))
+        Q = storage.load(str(self.key))
         return self.before | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
 
-    @cached_property
-    def Q(self) -> Matrix:
-        return self._schur[0]["Q"]
+    def make_Q(self) -> Matrix:
+        return storage.load_or_make(str(self.key), self._make_schur)[0]["Q"]
 
     def _open_factors(self, K: Stiffness) -> None:
         for k, block in enumerate(self.blocks):
@@ -118,10 +117,6 @@ class DensePrepared(Prepared):
     @cached_property
     def _factored(self) -> storage.Entry:
         return storage.load_or_make(self.factors_key, self._make_factors)
-
-    @cached_property
-    def _schur(self) -> storage.Entry:
-        return storage.load_or_make(str(self.key), self._make_schur)
 
     def _make_factors(self) -> storage.Entry:
         self.progress("Cholesky factors of K", 0.0)
@@ -146,7 +141,7 @@ class DensePrepared(Prepared):
         return {f"U{k}": block.U for k, block in enumerate(self.blocks)}, facts
 
     def _make_schur(self) -> storage.Entry:
-        _ = self.assembly.K.factors
+        self.assembly.K.ensure_factored()
         self.progress("Q = AᵀK⁻¹A", 0.0)
         start = time.perf_counter()
         Q = self.assembly.K.compliance(self.assembly.A)

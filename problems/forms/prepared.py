@@ -34,7 +34,7 @@ class Prepared:
     Parameters
     ----------
     assembly : K and A.
-    Q : makes Q (m, m), mm/N, in place of K's own `compliance`.
+    Q : (m, m) mm/N, where it is at hand; else made when first needed.
     coarser : makes an assembly of similar Q whose factors are cheaper, for M; None if there is none.
     """
 
@@ -44,11 +44,11 @@ class Prepared:
     def __init__(
         self,
         assembly: Assembly,
-        Q: Callable[[], Matrix] | None = None,
+        Q: Matrix | None = None,
         coarser: Callable[[], Assembly] | None = None,
     ) -> None:
         self.assembly, self.coarser = assembly, coarser
-        self._make_Q = Q or (lambda: assembly.K.compliance(assembly.A))
+        self.Q_if_made = Q
 
     @property
     def form(self) -> Form:
@@ -86,20 +86,26 @@ class Prepared:
         K = self.assembly.K
         sizes = {"K": sum(array.nbytes for array in K.arrays) / MIB}
         if K.dense or K.factored:
-            sizes["factors"] = 8 * K.numbers / MIB
+            sizes["factors"] = 8 * K.factor_nonzeros / MIB
         return sizes | ({"Q": 8 * self.assembly.m**2 / MIB} if K.dense else {})
 
     @property
     def opened(self) -> tuple[str, ...]:
         """K, and of the dense factors and Q those that were asked for."""
         K = self.assembly.K
-        asked = {"factors": K.dense and K.factored, "Q": "Q" in vars(self)}
-        return ("K", *(stage for stage, made in asked.items() if made))
+        stages = {"factors": K.dense and K.factored, "Q": self.Q_if_made is not None}
+        return ("K", *(stage for stage, made in stages.items() if made))
 
-    @cached_property
+    @property
     def Q(self) -> Matrix:
-        """Q = AᵀK⁻¹A, (m, m), mm/N; no code of the sparse form asks for it."""
-        return self._make_Q()
+        """Q = AᵀK⁻¹A, (m, m), mm/N, made when first needed; no code of the sparse form needs it."""
+        if self.Q_if_made is None:
+            self.Q_if_made = self.make_Q()
+        return self.Q_if_made
+
+    def make_Q(self) -> Matrix:
+        """Compute Q; a subclass may take it from elsewhere."""
+        return self.assembly.K.compliance(self.assembly.A)
 
     @property
     def compliance(self) -> Compliance:
@@ -153,8 +159,11 @@ class _Scaled(Prepared):
     def __init__(self, base: Prepared, D: Vector, R: Vector) -> None:
         K = base.assembly.K if (D == 1).all() else ScaledStiffness(base.assembly.K, D)
         assembly = replace(base.assembly, K=K, A=scaled(base.assembly.A, D, R))
-        super().__init__(assembly, Q=lambda: np.asfortranarray(base.Q * R * R[:, None]))
+        super().__init__(assembly)
         self.base, self.R = base, R
+
+    def make_Q(self) -> Matrix:
+        return np.asfortranarray(self.base.Q * self.R * self.R[:, None])
 
     @cached_property
     def approximate_inverse(self) -> ApproximateInverse:
@@ -165,7 +174,7 @@ def dual_alone(Q: Matrix) -> Prepared:
     """Q (m, m) mm/N without a joint: the dual program of K = Q⁻¹ and A = I, for p = −g (see `load_of`)."""
     from problems.stiffness.dense_block import InverseBlock  # of this only
 
-    return Prepared(Assembly(Stiffness([InverseBlock(Q)]), sp.eye_array(len(Q), format="csc")), Q=lambda: Q)
+    return Prepared(Assembly(Stiffness([InverseBlock(Q)]), sp.eye_array(len(Q), format="csc")), Q)
 
 
 def load_of(p: Vector) -> LoadCase:

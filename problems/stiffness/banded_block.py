@@ -49,7 +49,7 @@ class BandedBlock(SparseBlock):
         return self.width, self.order
 
     @property
-    def numbers(self) -> int:
+    def factor_nonzeros(self) -> int:
         return self.size * (self.width + 1)
 
     def solve(self, b: Matrix) -> Matrix:

@@ -59,7 +59,7 @@ class Block(ABC):
 
     @property
     @abstractmethod
-    def numbers(self) -> int:
+    def factor_nonzeros(self) -> int:
         """The float64 that its factor holds; about that, before a general one is made."""
 
     @abstractmethod
@@ -94,7 +94,7 @@ class Block(ABC):
 class SparseBlock(Block):
     """matrix : csc_array; copied only to be sorted and to add up what is given several times.
 
-    lost : of an entry of the diagonal: a pivot that is not larger is but the rounding of a zero.
+    A pivot ≤ lost · k_ii counts as zero: K is singular.
     """
 
     lost = 2.0**-50

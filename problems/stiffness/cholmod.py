@@ -14,12 +14,12 @@ from .block import scaled
 
 
 class Cholmod:
-    """K (N, N). lost : of an entry of the diagonal: a pivot that is not larger is but the rounding of a zero.
+    """K (N, N). A pivot ≤ lost · k_ii counts as zero: K is singular.
 
     Raises LinAlgError if K is not positive definite.
     """
 
-    numbers: int | None = None  # CVXOPT does not tell
+    nonzeros: int | None = None  # CVXOPT does not tell
 
     def __init__(self, K: sp.csc_array, lost: float) -> None:
         self.D = balanced_units(K.diagonal())

@@ -47,7 +47,7 @@ class DenseBlock(Block):
         return [self.U]
 
     @property
-    def numbers(self) -> int:
+    def factor_nonzeros(self) -> int:
         return self.size**2
 
     def multiply(self, x: Matrix) -> Matrix:

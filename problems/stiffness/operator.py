@@ -36,6 +36,7 @@ class Stiffness:
         ends = np.cumsum([0, *(block.size for block in self.blocks)])
         self.slices = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
         self.size = int(ends[-1])
+        self.factored = False  # whether the factors are made
 
     @classmethod
     def of(cls, *matrices: Any, nodes: Matrix | None = None) -> Stiffness:
@@ -88,33 +89,34 @@ class Stiffness:
 
     def solve(self, b: Matrix) -> Matrix:
         """K⁻¹ b, b (n,) or (n, k). Raises NotPositiveDefinite, or what `factor` raises."""
-        _ = self.factors
+        self.ensure_factored()
         return np.concatenate([block.solve(b[rows]) for block, rows in self._own_rows()])
 
     def _own_rows(self) -> Iterator[tuple[Block, slice]]:
         return zip(self.blocks, self.slices, strict=True)
 
-    @cached_property
+    def ensure_factored(self) -> None:
+        """Make the factors, unless they are made. Raises NotPositiveDefinite, or what `factor` raises."""
+        if not self.factored:
+            self._make(self)
+            self._make = Stiffness.factor_blocks  # what made them may hold this K, in a cycle
+            self.factored = True
+
+    @property
     def factors(self) -> list[NDArray[Any]]:
-        """The arrays of the factors, made now if they were not."""
-        self._make(self)
-        self._make = Stiffness.factor_blocks  # what made them may hold this K, in a cycle
+        """The arrays that hold the factors."""
+        self.ensure_factored()
         return [array for block in self.blocks for array in block.factor()]
 
     @property
-    def factored(self) -> bool:
-        """Whether the factors were made."""
-        return "factors" in vars(self)
-
-    @property
-    def numbers(self) -> int:
+    def factor_nonzeros(self) -> int:
         """The float64 that the factors hold."""
-        return sum(block.numbers for block in self.blocks)
+        return sum(block.factor_nonzeros for block in self.blocks)
 
     @property
-    def work(self) -> float:
+    def factorisation_flops(self) -> float:
         """Operations of a factorisation: about the entries of each column of a factor, squared."""
-        return sum(block.numbers**2 / block.size for block in self.blocks)
+        return sum(block.factor_nonzeros**2 / block.size for block in self.blocks)
 
     def factor_blocks(self) -> None:
         """Raises NotPositiveDefinite, with the number of an unknown that moves."""
@@ -154,7 +156,7 @@ class Stiffness:
 
     def least_eigenvalues(self, D: Vector, steps: int = POWER_STEPS) -> list[float]:
         """About λmin of each block of DKD, no smaller."""
-        _ = self.factors
+        self.ensure_factored()
         return [_least_eigenvalue(block.solve, D[rows], steps) for block, rows in self._own_rows()]
 
     def condition(self, D: Vector) -> float:
@@ -166,7 +168,7 @@ class Stiffness:
         """Q = AᵀK⁻¹A, (m, m), mm/N, by columns."""
         m = A.shape[1]
         Q = np.zeros((m, m), order="F")
-        _ = self.factors
+        self.ensure_factored()
         for block, rows in self._own_rows():
             if m:
                 Q += block.compliance(sp.csc_array(A[rows]))
@@ -178,7 +180,7 @@ class Stiffness:
         """Q_WW (k, k) mm/N, by columns, of windows W of contacts, in single precision to four digits, for a
         preconditioner; None unless every block has a band along which those of a window are near each other.
         """
-        _ = self.factors
+        self.ensure_factored()
         parts: list[BlockPart] = []
         for block, rows in self._own_rows():
             part = block.local_compliance(sp.csc_array(A[rows]), windows, single)
@@ -202,7 +204,7 @@ class ScaledStiffness(Stiffness):
     """
 
     def __init__(self, base: Stiffness, D: Vector) -> None:
-        super().__init__(base.blocks, lambda _: base.factors)
+        super().__init__(base.blocks, lambda _: base.ensure_factored())
         self.base, self.D = base, D
 
     @cached_property

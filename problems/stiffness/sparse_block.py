@@ -6,7 +6,6 @@ first that is narrow enough is taken.
 """
 
 from collections.abc import Iterator
-from functools import cached_property
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -48,12 +47,12 @@ def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Indices]:
 
 
 class GeneralFactor(Protocol):
-    """A factor of K. numbers : the float64 that it holds, if known. LinAlgError, where it is made, says that
+    """A factor of K. nonzeros : the float64 that it holds, if known. LinAlgError, where it is made, says that
     K is not positive definite.
     """
 
     @property
-    def numbers(self) -> int | None: ...
+    def nonzeros(self) -> int | None: ...
 
     def solve(self, b: Matrix) -> Matrix:
         """K⁻¹b, b (N,) or (N, k)."""
@@ -63,7 +62,7 @@ class GeneralFactor(Protocol):
 
 
 def general_factor(K: sp.csc_array, lost: float) -> GeneralFactor:
-    """lost : of an entry of the diagonal: a pivot that is not larger is but the rounding of a zero."""
+    """Factor K by the best library installed. A pivot ≤ lost · k_ii counts as zero: K is singular."""
     try:
         from .cholmod import Cholmod  # of an extra
     except ImportError:
@@ -74,46 +73,48 @@ def general_factor(K: sp.csc_array, lost: float) -> GeneralFactor:
 class GeneralBlock(SparseBlock):
     """width : the least half-bandwidth that was found."""
 
-    factored = staticmethod(general_factor)
+    make_factor = staticmethod(general_factor)
 
     def __init__(self, matrix: sp.csc_array, width: int) -> None:
         super().__init__(matrix)
         self.width = width
+        self.general_factor: GeneralFactor | None = None
 
     def replaced(self, matrix: sp.csc_array) -> Self:
         return type(self)(matrix, self.width)
 
-    @cached_property
-    def made(self) -> GeneralFactor:
-        try:
-            return self.factored(self.matrix, self.lost)
-        except np.linalg.LinAlgError as error:
-            raise NotPositiveDefinite(moving_unknown(self.matrix, self.lost)) from error
-
     def factor(self) -> list[NDArray[Any]]:
-        _ = self.made
+        self._ensured_factor()
         return []  # libraries keep their own
 
+    def _ensured_factor(self) -> GeneralFactor:
+        if self.general_factor is None:
+            try:
+                self.general_factor = self.make_factor(self.matrix, self.lost)
+            except np.linalg.LinAlgError as error:
+                raise NotPositiveDefinite(moving_unknown(self.matrix, self.lost)) from error
+        return self.general_factor
+
     @property
-    def numbers(self) -> int:
+    def factor_nonzeros(self) -> int:
         """Without a narrow band L has about b² log₂ N entries, as in nested dissection of a square grid with
         that half-bandwidth, for each body (George, SIAM J. Numer. Anal. 10:345–363, 1973). L and U are
         counted, and their indices.
         """
-        if "made" in vars(self) and self.made.numbers is not None:
-            return self.made.numbers
+        if self.general_factor is not None and self.general_factor.nonzeros is not None:
+            return self.general_factor.nonzeros
         bodies = connected_components(self.matrix, directed=False)[0]
         dissected = bodies * self.width**2 * np.log2(self.size / bodies)
         return int(WITH_INDICES * 2 * min(self.size * self.width, dissected))
 
     def solve(self, b: Matrix) -> Matrix:
-        return self.made.solve(b)
+        return self._ensured_factor().solve(b)
 
     def shifted(self, D: Vector, s: float) -> float | None:
         shifted = sp.csc_array(scaled(self.matrix, D, D) - s * sp.eye_array(self.size))
         largest = float(abs(shifted.diagonal()).max())
         try:
-            error = self.factored(shifted, self.lost).backward_error()
+            error = self.make_factor(shifted, self.lost).backward_error()
         except np.linalg.LinAlgError:
             return None
         return None if error is None else error + U * (largest + abs(s))

@@ -14,7 +14,7 @@ SOFT = 2.0**-30  # of an unknown's stiffness: springs that hold a mechanism
 
 
 class SuperLU:
-    """K (N, N). lost : of an entry of the diagonal: a pivot that is not larger is but the rounding of a zero.
+    """K (N, N). A pivot ≤ lost · k_ii counts as zero: K is singular.
 
     Raises LinAlgError if K is not positive definite.
     """
@@ -32,7 +32,7 @@ class SuperLU:
         return x
 
     @property
-    def numbers(self) -> int:
+    def nonzeros(self) -> int:
         """L and U are kept."""
         return int(self.lu.L.nnz + self.lu.U.nnz)
 
@@ -61,8 +61,8 @@ class SuperLU:
 
 
 def moving_unknown(K: sp.csc_array, lost: float) -> int:
-    """Of a K without a factor: one whose pivot is not positive, or that moves most if nothing else holds it,
-    each in its own unit.
+    """The unknown to name when K has no factor: the first with a pivot ≤ 0, else the one that moves most on
+    weak springs, each unknown in its own unit.
     """
     with suppress(RuntimeError):  # exactly singular
         lu = _factored(K)

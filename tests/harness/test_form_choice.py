@@ -33,7 +33,7 @@ def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_m
     assert (estimate.n, estimate.m) == (data.assembly.asked, data.assembly.m)
     assert estimate.unknowns == data.assembly.n
     assert estimate.half_bandwidth == max(map(half_bandwidth, data.assembly.K.matrices))
-    stored = 8 * data.assembly.K.numbers
+    stored = 8 * data.assembly.K.factor_nonzeros
     assert estimate.sparse_mib == pytest.approx(stored / 2**20)
 
 

@@ -29,7 +29,7 @@ from problems.stiffness.superlu import SuperLU
 @pytest.fixture(params=[Cholmod, SuperLU])
 def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """That factors what has no narrow band."""
-    monkeypatch.setattr(GeneralBlock, "factored", staticmethod(request.param))
+    monkeypatch.setattr(GeneralBlock, "make_factor", staticmethod(request.param))
 
 
 def close(found: Matrix, expected: Matrix) -> None:
@@ -75,8 +75,8 @@ def test_each_factor_solves_as_the_dense_matrix_does(seed: int) -> None:
         assert type(factor) is kind
         assert getattr(factor, "order", None) is None or K is far
         factor.factor()
-        told = kind is not GeneralBlock or factor.made.numbers is not None
-        assert not told or factor.numbers < K.shape[0] ** 2 / 2
+        told = kind is not GeneralBlock or factor.general_factor.nonzeros is not None
+        assert not told or factor.factor_nonzeros < K.shape[0] ** 2 / 2
         for b in (random.standard_normal(K.shape[0]), random.standard_normal((K.shape[0], 3))):
             close(factor.solve(b), np.linalg.solve(K.toarray(), b))
 
@@ -107,15 +107,15 @@ def test_the_size_of_a_factor_is_known_before_it_is_made(seed: int, monkeypatch:
     far, nodes = scattered(random, 400, 3)
     for K, where in ((band_matrix(random, 400, 3), None), (far, None), (far, nodes)):
         block = sparse_block(K, where)
-        assert block.numbers == sum(array.size for array in block.factor())
+        assert block.factor_nonzeros == sum(array.size for array in block.factor())
     for shape in ((290, 280 + 10 * seed), (25, 24, 23 + seed)):
         K = renumbered(grid(*shape), random.permutation(int(np.prod(shape))))
         block = sparse_block(K)
         assert isinstance(block, GeneralBlock)
-        monkeypatch.setattr(GeneralBlock, "factored", staticmethod(SuperLU))  # the other does not tell
-        expected = block.numbers
+        monkeypatch.setattr(GeneralBlock, "make_factor", staticmethod(SuperLU))  # the other does not tell
+        expected = block.factor_nonzeros
         block.factor()
-        assert expected / 2.5 < 1.5 * block.numbers < 2.5 * expected
+        assert expected / 2.5 < 1.5 * block.factor_nonzeros < 2.5 * expected
 
 
 def grid(*shape: int) -> sp.csc_array:
@@ -151,7 +151,7 @@ def test_a_mechanism_is_named_by_an_unknown_that_moves(seed: int) -> None:
 def test_the_block_of_a_mechanism_counts() -> None:
     blocks = (band_matrix(np.random.default_rng(1), 7, 2), chain(3))
     with pytest.raises(NotPositiveDefinite) as caught:
-        _ = Stiffness.of(*blocks).factors
+        Stiffness.of(*blocks).ensure_factored()
     assert 7 <= caught.value.unknown < 10
     assert str(caught.value.unknown) in str(caught.value)
 

@@ -172,7 +172,7 @@ def test_a_part_that_floats_is_refused(points: tuple[tuple[float, float], ...]) 
     joint = make_joint({"south": LONG}, contacts=[["a", "tool"]])
     effects = [Supports(kind="supports", part="a", points=points)] if points else []
     with pytest.raises(InputError, match="held against every rigid motion"):
-        _ = prepared(make_scene(joint, *effects)).assembly.K.factors
+        prepared(make_scene(joint, *effects)).assembly.K.ensure_factored()
 
 
 @pytest.mark.parametrize("form", ["dual", "primal", "sparse"])
@@ -217,7 +217,8 @@ def test_load_cases_of_some_effects_add_up_to_that_of_all() -> None:
 def test_factors_go_with_the_last_that_needs_them(form: Form) -> None:
     """Without the garbage collector: gigabytes would wait for it in a cycle."""
     data = prepared(read_scene("scaling/1170"), form=form)
-    _ = data.assembly.K.factors, data.approximate_inverse
+    data.assembly.K.ensure_factored()
+    _ = data.approximate_inverse
     K = weakref.ref(data.assembly.K)
     gc.disable()
     try:

@@ -127,7 +127,7 @@ def test_the_margin_of_a_general_factor_is_that_of_the_theorem(library: Any, n: 
 @pytest.mark.parametrize("seed", range(10))
 @LIBRARIES
 def test_a_general_factor_proves_it_as_well(library: Any, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(GeneralBlock, "factored", staticmethod(library))
+    monkeypatch.setattr(GeneralBlock, "make_factor", staticmethod(library))
     nearly_singular(seed, lambda K: GeneralBlock(K, K.shape[0]))
 
 

@@ -89,7 +89,7 @@ def test_the_inverse_is_full_and_symmetric(pairs: int) -> None:
 def test_duplicate_contacts_do_not_hinder_the_primal_form() -> None:
     """A spring of 1 N/mm pulled by 1 N towards two stops at 0.5 and 0.25 mm: x = 0.25 mm, λ = (0, 0.75) N."""
     A = sp.csc_array(np.array([[1.0, 1.0]]))
-    prepared = Prepared(Assembly(Stiffness.of(np.eye(1)), A), Q=lambda: np.ones((2, 2)))
+    prepared = Prepared(Assembly(Stiffness.of(np.eye(1)), A), np.ones((2, 2)))
     case, solver = LoadCase(np.array([1.0]), np.array([0.5, 0.25])), GoldfarbIdnani()
     load = replace(case, p=prepared.dual_load(case))
     answer = solver.solve(solver.prepare(in_form(prepared, "primal")), load, 1e-10)
