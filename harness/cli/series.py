@@ -100,7 +100,7 @@ def series(
         from harness.results.atomic_output import refuse_inputs, refuse_unwritable
         from harness.results.schema import SERIES
         from harness.results.series_file import read_facts
-        from harness.scene.allowed_gap import refuse_unusable, show_series
+        from harness.scene.allowed_gap import check_series, refuse_unusable, show_series
         from harness.scene.validate import print_unusual
         from harness.series.load_case_source import RANDOM, GivenCases
         from harness.series.run import run
@@ -144,10 +144,13 @@ def series(
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
         facts = {"solver_version": made.version, "solver_code": made.code}
         code = run(job, facts, out, console, scheduler)
+        verdict = None
+        if allow_gap is not None and code in (DONE, NOTHING_JUDGED):
+            verdict = check_series(out, allow_gap)
         if read_facts(out):
             from report.writers.series_report import write  # slow to import: not before the first row
 
             console.print(f"Report: {write(out)}")
-        if code in (DONE, NOTHING_JUDGED) and allow_gap is not None:
-            code = show_series(out, allow_gap, console) or code
+        if verdict:
+            code = show_series(verdict, console) or code
         raise typer.Exit(code)

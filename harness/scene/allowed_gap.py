@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Console
 
+from harness.results import series_file
+from harness.results.records import to_line
 from harness.terminal import DONE, GAP_EXCEEDED, NOTHING_JUDGED
 from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
 
     from report.results.series_results import Series
 
+CHECK = "allowed_gap"  # in the facts of a series
+#: Exit code and colour of an outcome.
+OUTCOMES = {"pass": (DONE, "green"), "fail": (GAP_EXCEEDED, "red"), "": (NOTHING_JUDGED, "yellow")}
 CONFIDENCE = 0.95  # of the interval of Clopper and Pearson for a share
 ROUNDING = 2.0**-24
 
@@ -61,7 +66,8 @@ def show(check: dict[str, Any], gap: Vector, nodes: Vector | None, console: Cons
     """Print the outcome for an answer, with the place of its largest gap; returns the exit code."""
     allowed, largest, contacts = check["allowed_mm"], check["largest_mm"], check["contacts"]
     if check["exceeded"] is None:
-        return _undecided("", allowed, check["uncertainty_mm"], console)
+        console.print(_untold("It", allowed, check["uncertainty_mm"]), style="yellow")
+        return NOTHING_JUDGED
     near = ""
     if (grid := check.get("closer_than_grid_mm")) is not None:
         near = f". This is closer to the limit than the grid can tell, about {grid:.1g} mm"
@@ -69,7 +75,8 @@ def show(check: dict[str, Any], gap: Vector, nodes: Vector | None, console: Cons
         near += f". {check['beyond_scan']}"
     if not contacts:
         said = f"no gap is larger than {allowed:g} mm; the largest is {largest:.3g} mm{near}"
-        return _passed(said, console)
+        console.print(f"PASS: {said}.", style="green")
+        return DONE
     console.print(
         f"FAIL: the gap is larger than {allowed:g} mm at {len(contacts)} of {len(gap)} contacts, "
         f"{check['share']:.1%} of the junction, between {', '.join(check['pairs'])}; the largest is "
@@ -79,42 +86,55 @@ def show(check: dict[str, Any], gap: Vector, nodes: Vector | None, console: Cons
     return GAP_EXCEEDED
 
 
-def show_series(directory: Path, allowed_mm: float, console: Console) -> int:
-    """Print the outcome for a series, write DIRECTORY/allowed-gap.csv and .png; returns the exit code."""
+def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
+    """The outcome for a series, recorded in it, with DIRECTORY/allowed-gap.csv and .png.
+
+    kind : pass, fail, or "" where it cannot be told. said : sentences, the outcome last.
+    """
     from scipy.stats import binomtest  # slow to import, as is the report: not before the first row
 
     from report.results.series_results import read
 
     series = read(directory)
-    if not len(series.cases):
-        return NOTHING_JUDGED
     found = exceeding(series, allowed_mm)
-    written = write(directory, series, found)
+    write(directory, series, found)
     within = found.answered - len(found.cases) - found.undecided
-    said = f"{within} of {found.answered} cases are surely within {allowed_mm:g} mm"
+    sure = f"{within} of {found.answered} cases are surely within {allowed_mm:g} mm"
     if found.answered and not series.swept:  # steps are no sample
         low, high = binomtest(within, found.answered).proportion_ci(CONFIDENCE, "exact")
-        said += f": the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
-    console.print(f"{said}.")
+        sure += f": the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
+    kind, said = "" if found.undecided or not found.answered else "pass", [f"{sure}."]
     if found.undecided:
-        where = f"In {found.undecided} of {found.answered} cases"
-        code = _undecided(where, allowed_mm, found.uncertainty_mm, console)
+        where = f"In {found.undecided} of {found.answered} cases it"
+        said.append(_untold(where, allowed_mm, found.uncertainty_mm))
     if len(found.cases):
-        worst, share = found.cases.iloc[0], len(found.cases) / found.answered
+        kind, worst, share = "fail", found.cases.iloc[0], len(found.cases) / found.answered
         often = int(np.argmax(found.shares))
-        console.print(
+        said.append(
             f"FAIL: the gap is larger than {allowed_mm:g} mm in {len(found.cases)} of {found.answered} cases "
             f"({share:.1%}), at {np.count_nonzero(found.shares)} of {len(found.shares)} contacts, most often "
             f"({found.shares[often]:.1%}) at {_place(often, series.nodes)}; the largest is "
-            f"{worst['max_gap_mm']:.3g} mm, in case {worst['case']:.0f}. Where: {written}",
-            style="red",
+            f"{worst['max_gap_mm']:.3g} mm, in case {worst['case']:.0f}."
         )
-        return GAP_EXCEEDED
-    if found.undecided:
-        return code
-    largest = series.cases["max_gap_mm"].max()
-    said = f"in none of {found.answered} cases is a gap larger than {allowed_mm:g} mm; the largest is"
-    return _passed(f"{said} {largest:.3g} mm", console)
+    elif kind:
+        largest = f"the largest is {series.cases['max_gap_mm'].max():.3g} mm"
+        said.append(
+            f"PASS: in none of {found.answered} cases is a gap larger than {allowed_mm:g} mm; {largest}."
+        )
+    check = {"kind": kind, "said": said}
+    facts = series_file.read_facts(directory) or {}
+    series_file.write_fact(directory, "series", to_line(facts | {CHECK: check}))
+    return check
+
+
+def show_series(check: dict[str, Any], console: Console) -> int:
+    """Print the outcome for a series; returns the exit code."""
+    first, *rest = check["said"]
+    console.print(first)
+    code, style = OUTCOMES[check["kind"]]
+    for sentence in rest:
+        console.print(sentence, style=style)
+    return code
 
 
 def _place(contact: int, nodes: Vector | None) -> str:
@@ -122,19 +142,9 @@ def _place(contact: int, nodes: Vector | None) -> str:
     return f"contact {contact}{at}"
 
 
-def _passed(said: str, console: Console) -> int:
-    console.print(f"PASS: {said}.", style="green")
-    return DONE
-
-
-def _undecided(where: str, allowed_mm: float, uncertainty_mm: float, console: Console) -> int:
-    it = f"{where} it" if where else "It"
-    console.print(
-        f"{it} cannot be told whether a gap is larger than {allowed_mm:g} mm: gaps are proven only to "
-        f"{uncertainty_mm:.1e} mm.",
-        style="yellow",
-    )
-    return NOTHING_JUDGED
+def _untold(it: str, allowed_mm: float, uncertainty_mm: float) -> str:
+    told = f"whether a gap is larger than {allowed_mm:g} mm: gaps are proven only to {uncertainty_mm:.1e} mm"
+    return f"{it} cannot be told {told}."
 
 
 @dataclass(frozen=True)
@@ -176,7 +186,7 @@ def exceeding(series: Series, allowed_mm: float) -> Exceeding:
     )
 
 
-def write(directory: Path, series: Series, found: Exceeding) -> Path:
+def write(directory: Path, series: Series, found: Exceeding) -> None:
     """Write DIRECTORY/allowed-gap.csv, one row per contact, and allowed-gap.png if its places are known."""
     import pandas as pd
     from matplotlib.colors import Normalize
@@ -194,6 +204,4 @@ def write(directory: Path, series: Series, found: Exceeding) -> Path:
         with style.applied():
             drawing, _ = drawn([Map(title, series.nodes, percent, scale)], 1)
             drawing.savefig(directory / "allowed-gap.png", dpi=style.DPI)
-    path = directory / "allowed-gap.csv"
-    table.to_csv(path, index_label="contact")
-    return path
+    table.to_csv(directory / "allowed-gap.csv", index_label="contact")

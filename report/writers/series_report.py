@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.checks import code_warnings
-from report.document.blocks import Figure, Section, Table, number, word
+from report.document.blocks import Figure, Section, Table, Text, number, word
 from report.document.escape import file_name
 from report.document.numbers import counted, significant, tidy_power
 from report.figures import style
@@ -34,6 +34,7 @@ PERCENT = {q: f"{100 * q:g} % quantile" for q in QUANTILES}
 LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))
 GAPS = {"max_gap_mm": "largest gap per case", "mean_gap_mm": "mean gap per case"}
 STEPS = {"setup_s": "update or set-up", "solve_s": "solve", "form_s": "x, gaps, residuals, error bound"}
+WHERE = "At each contact: [allowed-gap.csv](../allowed-gap.csv)."
 CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": "contacts, mean of the cases"}
 
 
@@ -44,7 +45,9 @@ def write(directory: Path) -> Path:
     """
     series = read(directory)
     target = emptied(directory / "report")
-    sections = [Section("Summary", [_summary(series)])]
+    check = series.facts.get("allowed_gap")
+    verdict = [Text(f"**{check['said'][-1]}** {' '.join(check['said'][:-1])} {WHERE}")] if check else []
+    sections = [Section("Summary", [*verdict, _summary(series)])]
     title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
     if len(series.cases):
         maps, curve = quantile_maps(series), exceedance(series)
@@ -185,8 +188,10 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
     known = {"machine": str(facts["machine"]), "recorded_at": "", "solver": identity["solver"]}
     rows = series.code.assign(**known, solver_code=identity.get("solver_code") or "")
     rows["clean"] = rows["clean"].astype(float)
+    check = facts.get("allowed_gap")
     return {
         "kind": "series",
+        "headline": {"kind": check["kind"], "text": " ".join(check["said"][::-1])} if check else None,
         "banner": banner(
             rows,
             warnings=code_warnings(rows),

@@ -33,7 +33,7 @@ CASES = 12
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
-    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
+    monkeypatch.setattr("report.writers.series_report._maps", lambda *_: [])
 
 
 @pytest.mark.parametrize(
@@ -171,15 +171,21 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     assert f"{CASES - 5} of {CASES} cases are surely within" in done.stdout
     assert f"between {low:.2%} and {high:.2%}" in done.stdout
     assert f"at {larger.any(axis=0).sum()} of {gaps.shape[1]} contacts" in done.stdout
-    assert f"in case {gaps.max(axis=1).argmax()}. Where" in done.stdout
+    assert f"in case {gaps.max(axis=1).argmax()}." in done.stdout
+    said = f"FAIL: the gap is larger than {allowed:g} mm in 5 of {CASES} cases"
+    assert all(said in (tmp_path / "report" / name).read_text() for name in ("report.md", "index.html"))
     assert (tmp_path / "allowed-gap.png").is_file()
     with (tmp_path / "allowed-gap.csv").open() as file:
         table = list(csv.DictReader(file))
     np.testing.assert_allclose([float(line["share_of_cases"]) for line in table], larger.mean(axis=0))
     again = harness(*asked, "--allow-gap", 9.0, "--out", tmp_path)
     assert (again.exit_code, "PASS: in none of 12 cases" in again.stdout) == (0, True)
+    assert harness(*asked, "--out", tmp_path).exit_code == 0
+    assert "PASS" not in (tmp_path / "report" / "report.md").read_text()
     unknown = harness(*asked, "--allow-gap", 1e-16, "--out", tmp_path)
     assert (unknown.exit_code, "In 12 of 12 cases it cannot be told" in unknown.stdout) == (3, True)
+    unjudged = harness(*asked, "--limit", 1e-30, "--allow-gap", allowed, "--out", tmp_path / "unjudged")
+    assert (unjudged.exit_code, f"{CASES} cannot be judged" in unjudged.stdout) == (4, True)
 
 
 def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
