@@ -12,11 +12,11 @@ import scipy.io
 import tiny_joint
 from hostile_draws import OF_SUFFIX
 from sample_size import Fault
+from small_joints import SCENE
 from small_problems import make_load, make_prepared, solve_by_nnls
 from suite_runs import rows_of, said_by
 from superelements import flat, stiffnesses, two_plates, write_part
 from synthetic_results import row, write_rows
-from test_hostile_input import SCENE
 from typer.testing import CliRunner
 
 from harness.cli.app import app

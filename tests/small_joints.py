@@ -38,6 +38,34 @@ clamped = ["{side}"]
 """
 
 
+GAP = """
+[[effect]]
+kind = "initial_gap"
+mean = 0.05
+random = { sd = 0.02, correlation_length = 60.0, seed = 3 }
+"""
+
+FASTENERS = """
+# Where they are now.
+[[effect]]
+kind = "fasteners"
+preload = 40.0
+points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]
+"""
+
+SCENE = f"""
+title = "TITLE"
+{two_parts()}
+[[effect]]
+kind = "initial_gap"
+mean = 0.1
+[[effect]]
+kind = "pressure"
+part = "a"
+value = 1e-3
+"""
+
+
 def make_scene(joint: Joint, *effects: Effect) -> JointScene:
     return JointScene("small", "small", joint, effects)
 

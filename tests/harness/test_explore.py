@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import harness
-from small_joints import two_parts
-from test_place import FASTENERS, GAP
+from small_joints import FASTENERS, GAP, two_parts
 
 from harness import solve
 from harness.explore.live_answers import CHANGED, Explorer, Settings

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy.stats import binom, binomtest
-from small_joints import two_parts
+from small_joints import FASTENERS, GAP, two_parts
 
 from harness import solve
 from harness.placement import search as search_module
@@ -27,20 +27,6 @@ from problems.errors import InputError
 from problems.load_cases import Listed
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
-
-GAP = """
-[[effect]]
-kind = "initial_gap"
-mean = 0.05
-random = { sd = 0.02, correlation_length = 60.0, seed = 3 }
-"""
-FASTENERS = """
-# Where they are now.
-[[effect]]
-kind = "fasteners"
-preload = 40.0
-points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]
-"""
 
 
 @pytest.fixture(scope="module")

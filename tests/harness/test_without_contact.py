@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import harness
+from matrix_files import FOLDERS, PATHS, files_of
 from rich.console import Console
-from test_formats import FOLDERS, PATHS, files_of
 
 from harness.scene.export import export, import_
 from harness.scene.solve import solve

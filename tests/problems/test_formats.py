@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from commands import harness
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matrix_files import PATHS, files_of
 from rich.console import Console
 from small_problems import make_load, make_prepared, solve_by_nnls
 
@@ -33,12 +34,6 @@ from problems.stiffness.operator import Stiffness
 ROOT = Path(__file__).parents[2]
 QUIET = Console(file=StringIO())
 SCENE = "gallery/installed-fasteners"  # springs join both parts into one block of K
-FOLDERS = ("mtx", "abaqus")
-PATHS = {"npz": "p.npz", "op4": "p.op4", "dmig": "p.pch", "mtx": "m", "abaqus": "a"}
-
-
-def files_of(form: str, path: Path) -> list[str]:
-    return [str(path / f"{name}.mtx") for name in "KAfg"] if form in FOLDERS else [str(path)]
 
 
 def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:

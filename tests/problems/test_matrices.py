@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.io
 import scipy.linalg as sla
 import scipy.sparse as sp
+from matrix_files import DATA, K1, write_mtx
 
 from harness.api import own_matrices, solve
 from problems.build import load_case, prepared
@@ -18,16 +18,6 @@ from problems.forms.prepared import Prepared
 from problems.input.matrix_files import read_mtx
 from problems.input.user_matrices import checked
 from problems.scene_files import read_scene
-
-RNG = np.random.default_rng(11)
-BASIS = RNG.standard_normal((4, 4))
-K1 = BASIS @ BASIS.T + 4 * np.eye(4)
-DATA: dict[str, Any] = {
-    "K": sla.block_diag(K1, 3 * K1),
-    "A": np.vstack([np.eye(4), -np.eye(4)]),
-    "f": RNG.standard_normal(8),
-    "g": np.array([0.1, 0.2, 0.0, -0.1]),
-}
 
 
 def opened(path: Path) -> tuple[Prepared, LoadCase]:
@@ -40,14 +30,6 @@ def opened(path: Path) -> tuple[Prepared, LoadCase]:
 def write_npz(folder: Path, **changes: Any) -> Path:
     path = folder / "mine.npz"
     np.savez(path, **{key: value for key, value in (DATA | changes).items() if value is not None})
-    return path
-
-
-def write_mtx(folder: Path, **changes: Any) -> Path:
-    for key, value in (DATA | changes).items():
-        scipy.io.mmwrite(folder / f"{key}.mtx", value[:, None] if value.ndim == 1 else value, precision=17)
-    path = folder / "mine.toml"
-    path.write_text("[matrices]\n" + "".join(f'{key} = "{key}.mtx"\n' for key in DATA))
     return path
 
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from commands import harness
+from effect_tables import TABLES, scene_of
 from scipy.sparse.linalg import splu
 from small_joints import make_joint, make_scene
-from test_only_what_is_called_for import TABLES, scene_of
 
 from problems import scene_files as reading
 from problems.build import load_case, model_of, prepared

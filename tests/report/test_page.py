@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hostile_texts import HOSTILE, MADE
 from synthetic_results import everything, no_answer, results, row, write_rows
-from test_hostile_text import HOSTILE, MADE
-from test_series_report import made as made_series
+from synthetic_series import made as made_series
 
 from report.page import answer, maps
 from report.page.answer import headline

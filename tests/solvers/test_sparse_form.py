@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from matrix_files import write_mtx
 from scipy.optimize import isotonic_regression
 from small_problems import make_load, make_prepared, make_strips, solve_by_nnls
 from sparse_matrices import band_matrix, graph_matrix
-from test_matrices import write_mtx
 
 from harness.solving.session import SolverSession
 from harness.verification.reference import best_of_candidates, reference

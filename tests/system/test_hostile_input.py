@@ -7,25 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import harness
-from small_joints import two_parts
+from small_joints import SCENE
 
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.suite import read_suite
 from problems.errors import InputError
 from problems.load_cases.sweep import sweep
 from problems.scene_files import read_scene
-
-SCENE = f"""
-title = "TITLE"
-{two_parts()}
-[[effect]]
-kind = "initial_gap"
-mean = 0.1
-[[effect]]
-kind = "pressure"
-part = "a"
-value = 1e-3
-"""
 
 
 def scene_file(folder: Path, *replaced: tuple[str, str]) -> Path:

@@ -1,18 +1,15 @@
 """Plug-ins that misbehave: each command ends, says what happened, and leaves no process and no traceback."""
 
-import os
 import re
 import signal
-import subprocess
-import sys
-import time
 from io import StringIO
 from pathlib import Path
 
 import pytest
 import tiny_joint
+from plugin_commands import THREAD, command, harness, interrupt, write
 from rich.console import Console
-from suite_runs import all_end, heed_interrupts, processes, rows_of, wait_for
+from suite_runs import processes, rows_of
 
 import harness.conformance.isolated as isolated
 import harness.measurement.solver_descriptions as describing
@@ -22,53 +19,6 @@ from harness.measurement.solver_descriptions import describe, described
 from harness.planning.suite import read_suite
 
 pytestmark = pytest.mark.slow
-
-ROOT = Path(__file__).parents[2]
-
-#: A plug-in: {0} runs when it is imported, {1} in solve, which has `lam`, the right answer.
-PLUGIN = """
-import atexit, os, sys, threading, time
-import numpy as np
-import scipy.linalg as sla
-from scipy.optimize import nnls
-from solvers.base import Answer, Solver
-{0}
-
-class Mine(Solver):
-    forms = ("dual",)
-
-    def solve(self, problem, load, tolerance):
-        L = sla.cholesky(problem.Q, lower=True)
-        lam, _ = nnls(L.T, sla.solve_triangular(L, load.p, lower=True))
-        {1}
-        return Answer("solved", lam, iterations=1)
-"""
-THREAD = "threading.Thread(target=time.sleep, args=(60,)).start()"
-
-
-def write(folder: Path, at_import: str = "", in_solve: str = "pass") -> Path:
-    path = folder / "mine.py"
-    path.write_text(PLUGIN.format(at_import, in_solve))
-    return path
-
-
-def command(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "harness", *map(str, arguments)]
-
-
-def environment(folder: Path) -> dict[str, str]:
-    """The cache of this test alone: it marks its processes."""
-    return {**os.environ, "RIVETBENCH_CACHE": str(folder / "cache")}
-
-
-def harness(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command, which must end, soon with all its processes, and without a traceback."""
-    done = subprocess.run(
-        command(*arguments), cwd=ROOT, env=environment(folder), capture_output=True, text=True, timeout=120
-    )
-    assert "Traceback" not in done.stdout + done.stderr
-    assert all_end(folder / "cache")
-    return done
 
 
 @pytest.mark.parametrize(
@@ -140,28 +90,6 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
     with pytest.raises(InputError, match="solver mine: forms"):
         described([("mine", {})], tmp_path / "mine.py", "test")
-
-
-def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> None:
-    """Once the command has made the file `begun`, the signal ends it and all that it started, with words."""
-    going = subprocess.Popen(
-        arguments,
-        cwd=ROOT,
-        env=environment(folder),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heed_interrupts,
-    )
-    wait_for(begun.exists)
-    start = time.monotonic()
-    going.send_signal(sent)
-    _, said = going.communicate(timeout=30)
-    assert time.monotonic() - start < 1
-    assert going.returncode == 130
-    assert "Interrupted" in said
-    assert "Traceback" not in said
-    assert all_end(folder / "cache")
 
 
 @pytest.mark.parametrize("what", ["check", "run"])

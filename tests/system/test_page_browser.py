@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import harness
+from hostile_texts import HOSTILE, results, solution
 from synthetic_results import everything, row, write_rows
 from synthetic_results import results as results_of
-from test_hostile_text import HOSTILE, results, solution
+from synthetic_series import made as made_series
 from test_page import DIRECTORIES, SCENES
-from test_series_report import made as made_series
 
 from report.page.run import run_data
 from report.page.write import write

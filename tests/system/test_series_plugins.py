@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 from commands import harness
+from plugin_commands import command, interrupt, write
+from plugin_commands import harness as outside
 from strip_scene import write_strip
 from suite_runs import all_end
-from test_hostile_plugins import command, interrupt, write
-from test_hostile_plugins import harness as outside
 
 from harness.results import series_file
 
