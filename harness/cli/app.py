@@ -5,6 +5,8 @@ Modules that are slow to import are imported inside the commands.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import signal
 import sys
 from collections.abc import Callable
@@ -35,7 +37,6 @@ class Listed(StrEnum):
     formats = "formats"
 
 
-@app.callback()
 def harness() -> None:
     """Compare quadratic-programming solvers on aircraft riveting problems.
 
@@ -114,8 +115,19 @@ COMMANDS: dict[str, Callable[..., None]] = {
     **{"run": run, "report": report, "gate": gate, "compare": compare},
     **{"check": check, "list": list_, "export": export, "import": import_, "judge": judge},
 }
+
+
+def help_of(command: Callable[..., None]) -> str:
+    """The docstring of a command, from its source where `python -OO` has dropped it."""
+    if command.__doc__:
+        return command.__doc__
+    (function,) = ast.parse(inspect.getsource(command)).body
+    return ast.get_docstring(function) or ""  # type: ignore[arg-type]
+
+
+app.callback(help=help_of(harness))(harness)
 for name, command in COMMANDS.items():
-    app.command(name)(command)
+    app.command(name, help=help_of(command))(command)
 
 
 def main() -> None:

@@ -81,3 +81,6 @@ def test_python_without_docstrings_and_assertions_writes_the_same_answer(tmp_pat
     for name in ("contacts.csv", "nodes.csv"):
         assert (tmp_path / "bare" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes()
     assert (tmp_path / "bare" / "index.html").is_file()
+    for words in (("--help",), ("series", "--help")):
+        said = [run(tmp_path, *switch, "-m", "harness", *words).stdout for switch in ((), ("-OO",))]
+        assert said[0] == said[1]
