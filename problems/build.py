@@ -17,10 +17,10 @@ from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Progress, silent
 from problems.model.effect import Effect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
+from problems.reporter import SILENT, Reporter
 from problems.storage import digest, fingerprint
 
 if TYPE_CHECKING:
@@ -54,14 +54,14 @@ def _of_joint(scene: JointScene) -> JointModel | SuperelementModel:
     return SuperelementModel.of(scene)
 
 
-def prepared(scene: Scene, progress: Progress = silent, form: Form = "dual") -> Prepared:
+def prepared(scene: Scene, reporter: Reporter = SILENT, form: Form = "dual") -> Prepared:
     """K and A of a scene, condensed from the cache or now, or as they are for the sparse form.
 
     Factors and Q are made when first needed. Raises InputError if a part can move freely, if a user's
     matrices are invalid, or if contacts of a rung depend on one another.
     """
     model = model_of(scene)
-    return model.sparse() if form == "sparse" else model.dense(progress)
+    return model.sparse() if form == "sparse" else model.dense(reporter)
 
 
 def load_case(scene: Scene, form: Form = "dual", effects: Iterable[Effect] | None = None) -> LoadCase:
@@ -93,12 +93,12 @@ class GivenModel:
         own = isinstance(scene, MatricesScene)
         return SparsePrepared(replace(given, K=K), key, seconds, scene.source_of, own)
 
-    def dense(self, progress: Progress = silent) -> DensePrepared:
+    def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         given, _, seconds, key = self._checked(sparse=False)
         K = given.K.as_dense()
         if K is not given.K:
             given = replace(given, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))
-        return DensePrepared(given, key, {"condensation": seconds}, self.scene.source_of, progress)
+        return DensePrepared(given, key, {"condensation": seconds}, self.scene.source_of, reporter)
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         return self._given(sparse)[1]

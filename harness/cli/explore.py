@@ -43,6 +43,7 @@ def explore(
         from harness.explore.live_answers import Explorer, Settings
         from harness.planning.form_choice import chosen_form
         from harness.scene.allowed_gap import refuse_unusable
+        from harness.terminal.console import ConsoleReporter
         from problems.forms import FORMS
         from problems.model.scene import JointScene
         from problems.scene_files import read_scene
@@ -51,7 +52,7 @@ def explore(
         read = read_scene(scene)
         settings = Settings.of(read)
         assert isinstance(read, JointScene)
-        with console.status("matrices, and the first answer"):
+        with ConsoleReporter(console).step("matrices, and the first answer"):
             explorer = Explorer(read, chosen_form(read, FORMS, None).form)
             first = explorer.answer(settings)
 

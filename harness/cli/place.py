@@ -70,7 +70,7 @@ def place(
         from harness.scene.allowed_gap import refuse_unusable
         from harness.scene.validate import print_unusual
         from harness.series.load_case_source import RANDOM, GivenCases
-        from harness.terminal.console import waiting
+        from harness.terminal.console import ConsoleReporter
         from problems.build import load_case
         from problems.effects.initial_gap import InitialGap
         from problems.errors import Fault, InputError
@@ -96,8 +96,7 @@ def place(
             each.random for each in movable.bare.effects_of(InitialGap)
         )
         total = 1 if one else cases or RANDOM
-        with waiting(console) as show:
-            (made,) = described([("newton", {})], None, "--solver", show)
+        (made,) = described([("newton", {})], None, "--solver", ConsoleReporter(console))
         choice = chosen_form(movable.bare, made.forms, None, total * len(holes))
 
         def cases_of(of: Scene) -> LoadCases:

@@ -106,7 +106,7 @@ def series(
         from harness.series.run import run
         from harness.series.session import Job
         from harness.terminal import DONE, NOTHING_JUDGED
-        from harness.terminal.console import waiting
+        from harness.terminal.console import ConsoleReporter
         from problems.errors import Fault, InputError
         from problems.load_cases.sweep import sweep as swept
         from problems.scene_files import read_scene
@@ -117,8 +117,7 @@ def series(
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        with waiting(console) as show:
-            (made,) = described([(solver, {})], plugin, "--solver", show)
+        (made,) = described([(solver, {})], plugin, "--solver", ConsoleReporter(console))
         if form and form.value not in made.forms:
             faults.append(Fault("--form", "form", form.value, f"{solver} takes {' and '.join(made.forms)}"))
         if not (0 < tolerance < inf and 0 < limit < inf):

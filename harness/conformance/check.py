@@ -15,6 +15,7 @@ from harness.solving.solver_answer import InvalidAnswer, checked, error_text, sh
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
+from problems.reporter import Reporter
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 
 from .known_problems import KnownCase, KnownProblem, arrays_of, known_problems
@@ -149,16 +150,16 @@ class _Raised(Exception):
         self.finding = finding
 
 
-class _Steps:
+class _Steps(Reporter):
     """A solver taken through its steps as in a measurement; an exception becomes a finding."""
 
     def __init__(self, solver: Solver, problem: Problem) -> None:
         self.problem = problem
-        self.session = SolverSession(solver, problem, TOLERANCE, self._lap)
+        self.session = SolverSession(solver, problem, TOLERANCE, self)
         self.session.open(batched=True)
 
     @contextmanager
-    def _lap(self, name: str) -> Iterator[None]:
+    def step(self, name: str) -> Iterator[None]:
         try:
             yield
         except (Exception, SystemExit) as error:
@@ -183,7 +184,7 @@ class _Steps:
         """None at all if the solver cannot."""
         if self.session.batch is None:
             return []
-        with self._lap("batched"):
+        with self.step("batched"):
             return self.session.solve_batch([case.load for case in cases])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,8 +12,9 @@ from harness.measurement.child_process import Events
 from harness.measurement.monitored_call import Monitored
 from harness.measurement.solver_descriptions import IMPORT_S, refuse_unimportable
 from harness.terminal import DONE, FAILED
-from harness.terminal.console import waiting
+from harness.terminal.console import ConsoleReporter
 from problems.errors import InputError
+from problems.reporter import SILENT, Reporter
 from solvers.base import Solver
 from solvers.registry import make_solver
 
@@ -28,21 +29,21 @@ def check(
     plugin: Path | None,
     time_limit_s: float,
     memory_limit_mib: int,
-    doing: Callable[[str], None] = lambda test: None,
+    reporter: Reporter = SILENT,
 ) -> list[Finding]:
     """All that is wrong with a solver by name, or with a plug-in.
 
-    time_limit_s : for each problem in each form. doing : called with the current one, again and again.
-    Raises InputError if the solver cannot be imported or made.
+    time_limit_s : for each problem in each form. Raises InputError if the solver cannot be imported or made.
     """
     found, test = [], ""
     phases = {"importing": IMPORT_S, "the test": time_limit_s}
-    with Monitored(check_here, (name, plugin), 1, phases, memory_limit_mib) as process:
+    monitored = Monitored(check_here, (name, plugin), 1, phases, memory_limit_mib)
+    with reporter.step(name), monitored as process:
         for event in process:
             test = event.get("test", test)
             if "finding" in event:
                 found.append(Finding(**event["finding"]))
-            doing(f"{name}: {test or 'importing'}")
+            reporter.progress(test or "importing")
         if not test:
             refuse_unimportable(event, process, plugin or "solvers", name)
     if "status" in event:
@@ -79,8 +80,7 @@ def run(
     """Check one solver after another, and print what is found. Returns 0 if nothing is wrong, else 1."""
     faulty = False
     for name in names:
-        with waiting(console) as show:
-            found = check(name, plugin, time_limit_s, memory_limit_mib, show)
+        found = check(name, plugin, time_limit_s, memory_limit_mib, ConsoleReporter(console))
         faulty |= bool(found)
         console.print(
             f"{name}: {len(found) or 'no'} fault{'s' if len(found) != 1 else ''}",

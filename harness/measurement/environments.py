@@ -12,29 +12,27 @@ import site
 import subprocess
 import sys
 import sysconfig
-import tempfile
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import distribution
 from pathlib import Path
 
 from problems import storage
 from problems.errors import InputError
+from problems.reporter import SILENT, Reporter
 
 #: Read after the .pth files of packages, whose folders come before those it adds.
 PARENT = "zzz-parent.pth"
 #: Where packages made by cmeel are, such as proxsuite. The .pth of cmeel adds only the folder beside cmeel.
 CMEEL = "cmeel.prefix/lib/python{}.{}/site-packages".format(*sys.version_info)
 COMPLETE = "complete"
-POLL_S = 0.2
 LAST_LINES = 5  # of what pip prints
 
 
-def interpreter(requirements: Sequence[str], doing: Callable[[str], None] = lambda text: None) -> str:
+def interpreter(requirements: Sequence[str], reporter: Reporter = SILENT) -> str:
     """The Python that has these packages, each NAME==VERSION; without any, this one.
 
-    The first call makes the environment, later ones find it. doing : called with what is being installed,
-    again and again. Raises InputError if pip fails; the next call tries anew.
+    The first call makes the environment, later ones find it. Raises InputError if pip fails; the next call
+    tries anew.
     """
     if not requirements:
         return sys.executable
@@ -44,21 +42,22 @@ def interpreter(requirements: Sequence[str], doing: Callable[[str], None] = lamb
     with storage.lock(key):
         if not ((folder / COMPLETE).is_file() and python.exists()):  # else one was cut off, or its base moved
             shutil.rmtree(folder, ignore_errors=True)
-            _make(folder, python, requirements, doing)
+            with reporter.step(f"installing {' '.join(requirements)}"):
+                _make(folder, python, requirements)
             (folder / COMPLETE).touch()
     return str(python)
 
 
-def _make(folder: Path, python: Path, requirements: Sequence[str], doing: Callable[[str], None]) -> None:
+def _make(folder: Path, python: Path, requirements: Sequence[str]) -> None:
     known = ["--without-pip"] if importlib.util.find_spec("pip") else []  # it sees that of this interpreter
-    _called([sys.executable, "-m", "venv", *known, str(folder)], requirements, doing)
+    _called([sys.executable, "-m", "venv", *known, str(folder)], requirements)
     own = sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)})
     lines = [f"import site; site.addsitedir({folder!r})" for folder in _packages()]
     (Path(own) / PARENT).write_text("\n".join([CMEEL, *lines, ""]), "utf-8")
     pip = [str(python), "-I", "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
     # First what is asked for, even if this interpreter has it; then what that needs and nobody has.
     for more in (["--ignore-installed", "--no-deps"], []):
-        _called([*pip, *more, *requirements], requirements, doing)
+        _called([*pip, *more, *requirements], requirements)
 
 
 def _packages() -> list[str]:
@@ -78,24 +77,13 @@ def refuse_other_copies(requirements: Sequence[str]) -> None:
                 raise InputError.one("--with", library, version, f"another copy is imported: {other}")
 
 
-def _called(command: Sequence[str], requirements: Sequence[str], doing: Callable[[str], None]) -> None:
+def _called(command: Sequence[str], requirements: Sequence[str]) -> None:
     """Wait for a command. Raises InputError with the end of what it printed if it fails."""
-    nothing, same = subprocess.DEVNULL, subprocess.STDOUT
-    with (
-        tempfile.TemporaryFile() as printed,
-        subprocess.Popen(command, stdin=nothing, stdout=printed, stderr=same) as process,
-    ):
-        try:
-            while process.poll() is None:
-                doing(f"installing {' '.join(requirements)}")
-                time.sleep(POLL_S)
-        finally:
-            process.kill()
-        printed.seek(0)
-        text = printed.read().decode(errors="replace")
-    if process.returncode:
+    nothing, pipe, same = subprocess.DEVNULL, subprocess.PIPE, subprocess.STDOUT
+    ended = subprocess.run(command, stdin=nothing, stdout=pipe, stderr=same, errors="replace")
+    if ended.returncode:
         library, _, version = requirements[0].partition("==")
         allowed = f"pip cannot install it: `pip index versions {library}` lists all; run again to retry"
-        said = [line.strip() for line in text.splitlines() if line.strip()]
+        said = [line.strip() for line in ended.stdout.splitlines() if line.strip()]
         last = [line for line in said if not line.startswith("WARNING")][-LAST_LINES:]
         raise InputError.one("--with", library, version, "\n".join([allowed, *last]))

@@ -24,6 +24,7 @@ from harness.results.row_validation import refuse_wrong_kinds
 from harness.solving.solver_answer import shown
 from problems.errors import Fault, InputError
 from problems.forms import FORMS, default_form
+from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from problems.storage import ROOT, fingerprint
 from solvers.base import Form, Solver
@@ -61,18 +62,18 @@ class Description:
 Solvers = dict[tuple[str, str], Description]
 
 
-def describe(suite: Suite, doing: Callable[[str], None] = lambda text: None) -> list[Description]:
+def describe(suite: Suite, reporter: Reporter = SILENT) -> list[Description]:
     """A description of each of the suite's solver entries, as `described` gives them."""
     installed = [(e.name, e.options) for e in suite.solver if not e.requirements]
-    here = iter(described(installed, suite.plugin, f"suite {suite.name}", doing))
-    return [_of_version(e, suite.plugin, doing) if e.requirements else next(here) for e in suite.solver]
+    here = iter(described(installed, suite.plugin, f"suite {suite.name}", reporter))
+    return [_of_version(e, suite.plugin, reporter) if e.requirements else next(here) for e in suite.solver]
 
 
-def _of_version(entry: SolverEntry, plugin: str | None, doing: Callable[[str], None]) -> Description:
+def _of_version(entry: SolverEntry, plugin: str | None, reporter: Reporter) -> Description:
     """A description in the entry's own environment; one that says so if it cannot be had there."""
     solver, requirements = (entry.name, entry.options), entry.requirements or []
     try:
-        (found,) = described([solver], plugin, "--with", doing, requirements)
+        (found,) = described([solver], plugin, "--with", reporter, requirements)
     except InputError as error:
         return Description(entry.forms or list(FORMS), entry.version, code="", failure=str(error))
     return replace(found, version=entry.version)
@@ -82,23 +83,23 @@ def described(
     solvers: Sequence[tuple[str, dict[str, Any]]],
     plugin: str | Path | None,
     where: str,
-    doing: Callable[[str], None] = lambda text: None,
+    reporter: Reporter = SILENT,
     requirements: Sequence[str] = (),
 ) -> list[Description]:
     """A description of each solver, given by name and options. Raises InputError, all faults at once.
 
-    where : what names them. doing : called with what is being imported, again and again.
-    requirements : what the environment has in other versions than this one.
+    where : what names them. requirements : what the environment has in other versions than this one.
     """
     if not requirements and all(owner_of(name) != "library" for name, _ in solvers):
         return found_here(solvers, None)
     name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None, requirements)
-    python = interpreter(requirements, doing)
+    python = interpreter(requirements, reporter)
     limits = {"importing the solvers": IMPORT_S}
-    with Monitored(describe_here, job, 1, limits, IMPORT_MIB, python) as process:
+    monitored = Monitored(describe_here, job, 1, limits, IMPORT_MIB, python)
+    with reporter.step("importing"), monitored as process:
         for event in process:
             name = event.get("name", name)
-            doing(f"importing {name}")
+            reporter.progress(name)
         refuse_unimportable(event, process, plugin or where, name)
     return [Description(**found) for found in event["found"]]
 

@@ -20,7 +20,7 @@ from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
-from harness.terminal.console import Display, waiting
+from harness.terminal.console import ConsoleReporter, Display
 from harness.verification.reference_problem import (
     ReferenceProblem,
     measurable,
@@ -48,8 +48,7 @@ def run(
     """
     if key is not None:
         suite = with_key(suite, key)
-    with waiting(console) as show:
-        descriptions = describe(suite, show)
+    descriptions = describe(suite, ConsoleReporter(console))
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite) if key is None else of_key(expand(suite), key)
@@ -152,13 +151,13 @@ def pending_tasks(
             opened, made = {}, set()
         family = form_family(m.form)
         if family not in opened:
-            building = partial(display.building, m.scene)
-            opened[family] = measurable(m.source, building, m.reference_limit_s, m.form)
+            with display.step(m.scene):
+                opened[family] = measurable(m.source, display, m.reference_limit_s, m.form)
         problem = opened[family]
         if m.form not in made:
             _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
             made.add(m.form)
-        display.doing(f"{m.scene}: {m.solver} {m.form}")
+        display.progress(f"{m.scene}: {m.solver} {m.form}")
         limit_s, stop = stopped_at(m, rows)
         batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
         timed_out_on = predicted_timeout(batch[0], problem.prepared.assembly.asked, rows)

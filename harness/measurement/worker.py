@@ -26,6 +26,7 @@ from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
 from problems.model.scene import Scene
+from problems.reporter import Reporter
 from problems.scene_files import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
@@ -80,7 +81,7 @@ def measure_here(job: tuple[Sequence[Measurement], Sequence[Path]], events: Even
         events.report(**outcome)
 
 
-class Run:
+class Run(Reporter):
     """The measurements of one process."""
 
     def __init__(self, measurements: Sequence[Measurement], answers: Sequence[Path], events: Events) -> None:
@@ -88,7 +89,8 @@ class Run:
         self.report = events.report
 
     @contextmanager
-    def lap(self, name: str, before: float = 0.0) -> Iterator[None]:
+    def step(self, name: str, before: float = 0.0) -> Iterator[None]:
+        """Report the seconds of a step, and those before, under its name."""
         start = time.perf_counter()
         yield
         self.report(**{name: before + time.perf_counter() - start})
@@ -99,7 +101,7 @@ class Run:
         solver = make_solver(m.solver, m.options, Path(m.plugin) if m.plugin else None)
         if m.form not in solver.forms:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
-        with self.lap("load_s"):
+        with self.step("load_s"):
             scene = read_scene(m.source)
             problem = in_form(prepared(scene, form=m.form), m.form)
             start = time.perf_counter()
@@ -108,7 +110,7 @@ class Run:
                 self.report(model_s=problem.model_s + time.perf_counter() - start)
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
-        session = SolverSession(solver, problem, m.tolerance, self.lap)
+        session = SolverSession(solver, problem, m.tolerance, self)
         if m.batched is None:
             for case, file in zip(cases, files, strict=True):
                 outcome = self.solved(session, case, file)
@@ -132,7 +134,7 @@ class Run:
         answer = session.next(load, near)
         x = answer.x
         if "x" not in problem.needs and answer.lam is not None:
-            with self.lap("form_s", form_s):
+            with self.step("form_s", form_s):
                 (x,) = problem.recover([answer.lam], [None], [case])
         return self.saved(answer, x, answer_file, problem, figures(answer) | {"warm": near is not None})
 

@@ -7,10 +7,9 @@ DIRECTORY/own, on the scenes as a user would read them.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, replace
-from itertools import count
 from math import floor, log10
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from harness.scene.scene_file import MOVED, edited, with_fasteners, with_gaps
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from harness.terminal import DONE, GAP_EXCEEDED
+from harness.terminal.console import ConsoleReporter
 from harness.verification.judge import LIMIT_MM
 from problems.build import prepared
 from problems.effects.fasteners import Fasteners
@@ -94,9 +94,10 @@ def run(
     with records.locked(directory, (), other=records.MEASUREMENTS):
         scene_of(tomllib.loads(text_of(movable.own)), str(directory / "own.toml"))  # as is refused at the end
         pool = workers(scheduler, console) if scheduler else nullcontext()
-        with pool as where, _showing(console) as said:
+        reporter = ConsoleReporter(console, plain=True)
+        with pool as where, reporter.step("search"):
             ask = Asked(study, directory / PLANS, identity, where)
-            search = Search(ask, study.bare, nodes, candidates, 0, 0, goal.limit_mm or 0.0, said)
+            search = Search(ask, study.bare, nodes, candidates, 0, 0, goal.limit_mm or 0.0, reporter)
 
             def again(sample: Sample, more: int) -> None:
                 words = f"{_kept(goal, sample)}: that is too few. The search goes on with {more} cases."
@@ -223,21 +224,3 @@ def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
         left += f"; in {share} it is {step.gap_mm:.3g} mm"
     more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
     return f"FAIL: {left}, {more}; case {worst} is the worst, at {place}.", GAP_EXCEEDED
-
-
-@contextmanager
-def _showing(console: Console) -> Iterator[Callable[[Step], None]]:
-    """Shows each plan that is kept, as a line of its own if the console is no terminal."""
-    with console.status("all candidates") as status:
-        numbers = count(1)
-
-        def said(step: Step) -> None:
-            proven = counted(next(numbers), "plan")
-            plan = f"{counted(len(step.plan), 'fastener')}, {step.moved}"
-            line = f"{plan}: {step.gap_mm:.3g} mm ({proven} proven)"
-            if console.is_terminal:
-                status.update(line)
-            else:
-                console.print(line)
-
-        yield said

@@ -22,9 +22,10 @@ for, it starts from each.
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import combinations
 from math import comb, dist
 from typing import TypeAlias
@@ -35,6 +36,8 @@ from harness.placement.candidates import Place, Plan, uniform_plans
 from harness.placement.session import Outcome, Question
 from problems.forms.assembly import Matrix
 from problems.model.scene import JointScene
+from problems.reporter import SILENT, Reporter
+from report.document.numbers import counted
 
 Ask: TypeAlias = Callable[[Sequence[Question]], list[list[Outcome]]]
 Value: TypeAlias = tuple[float, float]
@@ -75,7 +78,7 @@ class Step:
 @dataclass
 class Search:
     """ask : answers questions. bare : the scene without fasteners. contacts : (m, 2) their places, mm.
-    cases : K. allowed : how many may fail. said : told of each plan that is kept.
+    cases : K. allowed : how many may fail. reporter : is told each plan that is kept.
     """
 
     ask: Ask
@@ -85,7 +88,8 @@ class Search:
     cases: int
     allowed: int
     limit_mm: float
-    said: Callable[[Step], None] = lambda step: None
+    reporter: Reporter = SILENT
+    proven: Iterator[int] = field(default_factory=lambda: itertools.count(1))
 
     def gap(self, outcome: Outcome) -> float:
         """G, mm, of all cases, or of those in the outcome."""
@@ -107,7 +111,9 @@ class Search:
         found = zip(plans, self._left(plans, range(self.cases), TOGETHER), strict=True)
         steps = [Step(plan, self.gap(outcome), outcome, moved) for plan, outcome in found]
         for step in steps:
-            self.said(step)
+            proven = counted(next(self.proven), "plan")
+            words = f"{counted(len(step.plan), 'fastener')}, {step.moved}: {step.gap_mm:.3g} mm"
+            self.reporter.progress(f"{words} ({proven} proven)")
         return steps
 
     def _left(

@@ -5,8 +5,8 @@ Python.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,8 @@ from harness.verification.reference_problem import ReferenceProblem, opened
 from problems.errors import InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Vector
-from problems.forms.problem import Progress
 from problems.model.scene import Scene
+from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene, scene_of
 from solvers.base import Answer, Solver
 
@@ -85,9 +85,7 @@ def solve(
     form: Form | None = None,
     tolerance: float = 1e-9,
     limit_s: float | None = None,
-    progress: Progress = lambda text, fraction: None,
-    doing: Callable[[str], AbstractContextManager[Any]] = lambda step: nullcontext(),
-    said: Callable[[str], None] = lambda sentence: None,
+    reporter: Reporter = SILENT,
 ) -> Solution:
     """Solve a scene, and judge the answer.
 
@@ -95,8 +93,7 @@ def solve(
         reference, as also where the answer without contact violates no gap and so no solver is called for.
     form : "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
     tolerance : passed to the solver, with its options. limit_s : after it no further candidate for the
-        reference is tried. progress : of building the matrices. doing : entered around each step, given its
-        name. said : given what a person should know before the answer is there.
+        reference is tried. reporter : is told the steps, and what to know before the answer is there.
 
     Raises InputError.
     """
@@ -105,7 +102,7 @@ def solve(
     @contextmanager
     def step(name: str) -> Iterator[None]:
         start = time.perf_counter()
-        with doing(name):
+        with reporter.step(name):
             yield
         seconds[name] = time.perf_counter() - start
 
@@ -115,16 +112,16 @@ def solve(
         asked = form_of(named[0], forms, form) if form and named else form
         choice = chosen_form(scene, forms, asked)
     if choice.why:
-        said(f"In the sparse form, without condensation: {choice.why}")
+        reporter.say(f"In the sparse form, without condensation: {choice.why}")
     with step("matrices, loads and gaps"):
-        problem = opened(scene, choice.form, progress, limit_s)
+        problem = opened(scene, choice.form, reporter, limit_s)
         problem.prepared.assembly.K.ensure_factored()
         p = problem.prepared.dual_load(problem.load)
     if np.isnan(p).any():
         largest = float(abs(problem.load.f).max(initial=0.0))
         raise InputError.one(scene.source_of("f"), "largest |f|", largest, "loads with finite displacements")
     for note in problem.prepared.assembly.notes:
-        said(note)
+        reporter.say(note)
     with step("answer with a proven bound"):
         known = problem.reference
     closest = float(-p.max()) if p.size else None

@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
-from rich.text import Text
 
 from harness.results.atomic_output import atomic_output, refuse_unwritable, write_record
 from harness.results.provenance import machine, provenance, resident_mib
 from harness.terminal import DONE, FAILED
+from harness.terminal.console import ConsoleReporter
 from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
@@ -38,11 +38,24 @@ from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.positions import FORCES
 from problems.model.scene import JointScene, MatricesScene, Scene
+from problems.reporter import Stage
 from problems.scene_files import read_scene
 
 from . import allowed_gap, grid_error, solution
 from .solution import Solution
 from .validate import digits_sentence, print_unusual
+
+
+class _Builds(ConsoleReporter):
+    """Keeps in mind which stages were made."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(console)
+        self.stages = set[Stage]()
+
+    def building(self, stage: Stage, fraction: float = 0.0, part: str = "") -> None:
+        self.stages.add(stage)
+        super().building(stage, fraction, part)
 
 
 def solve(
@@ -71,21 +84,19 @@ def solve(
         allowed = "left out: the grid of superelements and of given matrices is not known here"
         raise InputError.one("--refine", "scene", scene.name, allowed)
     print_unusual(scene, console)
-    built: dict[str, float] = {}  # what the cache did not hold, and how far it is
+    reporter = _Builds(console)
     found = solution.solve(
         scene,
         solver,
         form=form,
         tolerance=tolerance,
         limit_s=reference_limit_s,
-        progress=built.__setitem__,
-        doing=lambda step: console.status(Text(step)),
-        said=lambda sentence: console.print(Text(f"{sentence}.", style="yellow")),
+        reporter=reporter,
     )
-    assembly, record = found.problem.prepared.assembly, _record(found, list(built), solver)
+    assembly, record = found.problem.prepared.assembly, _record(found, reporter.stages, solver)
     _show(record, console)
     before = time.perf_counter()
-    with console.status(Text("the same joint on another grid")):
+    with reporter.step("the same joint on another grid"):
         grid = grid_error.estimated(found, refine)
     if grid is not None:
         found.seconds["grid error"] = time.perf_counter() - before
@@ -101,7 +112,7 @@ def solve(
     code = DONE if record["verdict"] == "within" else FAILED
     if allow_gap_mm is not None:
         code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
-    with console.status(Text("pictures and files")), atomic_output(out, scene.sources) as new:
+    with reporter.step("pictures and files"), atomic_output(out, scene.sources) as new:
         from report.writers.answer_report import write  # slow to import: not before the answer is shown
 
         new.mkdir()
@@ -139,7 +150,7 @@ def _arrays(found: Solution) -> dict[str, Any]:
     return arrays if nodes is None else arrays | {"nodes": nodes, "contact_nodes": assembly.contact_nodes}
 
 
-def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, Any]:
+def _record(found: Solution, built: set[Stage], solver: str | None) -> dict[str, Any]:
     """DIR/solution.json. built : what the cache did not hold."""
     problem, known, judged = found.problem, found.problem.reference, found.judgement
     scene, data = problem.scene, problem.prepared
@@ -175,7 +186,7 @@ def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, 
     }
 
 
-def _skipped(found: Solution, built: list[str], solver: str | None) -> Iterator[str]:
+def _skipped(found: Solution, built: set[Stage], solver: str | None) -> Iterator[str]:
     if not found.has_contact:
         instead = f"; {solver} was not run" if solver else ""
         why = "The scene has no contact"
@@ -187,7 +198,7 @@ def _skipped(found: Solution, built: list[str], solver: str | None) -> Iterator[
         yield "condensation, dense factors and Q: the sparse model was solved as it is"
     elif not built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
-    elif _is_of_plates(found.problem.scene) and not any(step.startswith("condensing") for step in built):
+    elif _is_of_plates(found.problem.scene) and Stage.CONDENSATION not in built:
         yield "condensation: the parts came from the cache"
 
 

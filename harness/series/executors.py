@@ -23,6 +23,7 @@ from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.solving.call_lock import in_turn
 from harness.solving.solver_answer import StoredFiles
+from harness.terminal.console import ConsoleReporter
 from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError
@@ -42,7 +43,7 @@ def results_of(
             yield results
         return
     if scheduler is None:
-        with console.status("opening the assembly, preparing the solver"):
+        with ConsoleReporter(console).step("opening the assembly, preparing the solver"):
             session = SeriesSession(job)
         yield session.solve(remaining)
         return

@@ -26,6 +26,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.load_cases import LoadCases
 from problems.model.scene import Scene
+from problems.reporter import Reporter
 from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver
 
@@ -77,7 +78,7 @@ class Attempt:
     answer: Answer
 
 
-class SeriesSession:
+class SeriesSession(Reporter):
     """A job in this process.
 
     solver : made by the caller, or else by its name. report : called with phase="solve" and `cases` where
@@ -98,11 +99,11 @@ class SeriesSession:
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.options, job.plugin)
         self.row: Row = {}  # of the case being solved
-        self.session = SolverSession(solver, self.problem, job.tolerance, self._lap, KEPT_ANSWERS)
+        self.session = SolverSession(solver, self.problem, job.tolerance, self, KEPT_ANSWERS)
         self.session.open(batched=True)
 
     @contextmanager
-    def _lap(self, name: str) -> Iterator[None]:
+    def step(self, name: str) -> Iterator[None]:
         if name == "convert_s":
             self.report(phase="solve")
         start = time.perf_counter()

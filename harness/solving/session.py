@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
 from problems.forms.solver_units import Units
+from problems.reporter import SILENT, Reporter
 from solvers.base import Answer, Batch, Solver, WarmStart
 
 from .solver_answer import InvalidAnswer, checked
@@ -28,8 +29,6 @@ NO_CONTACT = "no contact closes"
 DENSE = ("newton", "ipm-fast", "ipm", "gi")
 SPARSE = ("newton", "mprgp")
 TOLERANCE_MM = 1e-11  # of these
-#: A context around a step of the solver, given the row field of its seconds: times it, or names what failed.
-Lap = Callable[[str], AbstractContextManager[None]]
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class SolverSession:
 
     Parameters
     ----------
-    lap : entered around each step, with convert_s, prepare_s, setup_s or solve_s.
+    reporter : its steps are those of the solver: convert_s, prepare_s, setup_s, solve_s.
     most : answers kept for warm starts; all by default.
 
     Raises what the solver raises, and InvalidAnswer if an answer is invalid.
@@ -60,10 +59,10 @@ class SolverSession:
         solver: Solver,
         problem: Problem,
         tolerance: float,
-        lap: Lap = lambda name: nullcontext(),
+        reporter: Reporter = SILENT,
         most: int | None = None,
     ) -> None:
-        self.solver, self.problem, self.tolerance, self.lap = solver, problem, tolerance, lap
+        self.solver, self.problem, self.tolerance, self.reporter = solver, problem, tolerance, reporter
         self.solved: deque[Solved] = deque(maxlen=most)
         self.opened = False
         self.state: Any = None
@@ -146,7 +145,7 @@ class SolverSession:
 
     @contextmanager
     def _step(self, name: str) -> Iterator[None]:
-        with self.lap(name), self.in_one_process():
+        with self.reporter.step(name), self.in_one_process():
             yield
 
     def _solve(self, load: LoadCase, tolerance: float) -> Answer:

@@ -5,8 +5,7 @@ run: each row as it is finished, above a progress bar.
 from __future__ import annotations
 
 import re
-import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -15,6 +14,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    SpinnerColumn,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
@@ -24,6 +24,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 from harness.results.records import Row
+from problems.reporter import Reporter
 
 from . import READER_GONE
 
@@ -33,7 +34,6 @@ ILLEGIBLE = re.compile(
     "[\0-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]"
 )
 UNKNOWN = "\N{REPLACEMENT CHARACTER}"
-QUIET_S = 2.0  # before a line says what is being done
 
 
 def legible(text: str) -> str:
@@ -65,21 +65,40 @@ class PlainConsole(Console):
             yield segment if segment.control else segment._replace(text=legible(segment.text))
 
 
-@contextmanager
-def waiting(console: Console) -> Iterator[Callable[[str], None]]:
-    """Yields a function to call again and again with what is being done; the line goes when it is over."""
-    started, status = time.monotonic(), console.status("")
+class ConsoleReporter(Reporter):
+    """A line with the step, its progress and its seconds, gone when the step is over; sentences stay.
 
-    def show(text: str) -> None:
-        seconds = time.monotonic() - started
-        if seconds > QUIET_S and console.is_terminal:
-            status.update(Text(f"{text}: {seconds:.0f} s"))
-            status.start()
+    plain : without a terminal, each progress is a line that stays.
+    """
 
-    try:
-        yield show
-    finally:
-        status.stop()
+    def __init__(self, console: Console, plain: bool = False) -> None:
+        self.console, self.plain = console, plain and not console.is_terminal
+        text = TextColumn("{task.fields[name]}{task.description}", markup=False)
+        columns = SpinnerColumn(), text, TimeElapsedColumn()
+        hidden = not console.is_terminal
+        self.line = Progress(*columns, console=console, transient=True, disable=hidden)
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        task = self.line.add_task("", name=name)
+        try:
+            with self.line:
+                yield
+        finally:
+            self.line.remove_task(task)
+
+    def progress(self, text: str, fraction: float = 0.0) -> None:
+        if self.plain:
+            self.console.print(text)
+        for task in self.line.task_ids:
+            self.line.update(task, description=f": {_with_share(text, fraction)}")
+
+    def say(self, sentence: str) -> None:
+        self.console.print(f"{sentence}.", style="yellow")
+
+
+def _with_share(text: str, fraction: float) -> str:
+    return f"{text} {fraction:.0%}" if fraction else text
 
 
 STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no_answer": "red"}
@@ -129,12 +148,12 @@ def row_text(row: Row) -> Text:
     return text
 
 
-class Display:
+class Display(Reporter):
     """Rows scroll above a progress bar; without a terminal only the rows are printed."""
 
     def __init__(self, console: Console, left: int, done: int) -> None:
         self.console = console
-        self.progress = Progress(
+        self.bar = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
@@ -143,23 +162,26 @@ class Display:
             console=console,
             disable=not console.is_terminal,
         )
-        self.task: TaskID = self.progress.add_task("", total=left + done, completed=done)
+        self.task: TaskID = self.bar.add_task("", total=left + done, completed=done)
+        self.heading = ""
 
     def __enter__(self) -> Display:
         self.console.print(_line([heading for heading, *_ in COLUMNS]), style="bold", soft_wrap=True)
-        self.progress.start()
+        self.bar.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
-        self.progress.stop()
+        self.bar.stop()
 
-    def doing(self, text: str) -> None:
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        self.heading = f"{name}: "
+        yield
+        self.heading = ""
+
+    def progress(self, text: str, fraction: float = 0.0) -> None:
         """Show the current activity beside the bar."""
-        self.progress.update(self.task, description=text)
-
-    def building(self, scene: str, step: str, fraction: float) -> None:
-        """Show the progress of a step of building a scene."""
-        self.doing(f"{scene}: {step} {fraction:.0%}" if fraction else f"{scene}: {step}")
+        self.bar.update(self.task, description=self.heading + _with_share(text, fraction))
 
     def finished(self, row: Row) -> None:
         """Print the row of a measurement that is done."""
@@ -168,4 +190,4 @@ class Display:
 
     def passed_over(self, count: int) -> None:
         """Note that so many measurements need not be made any more."""
-        self.progress.update(self.task, advance=count)
+        self.bar.update(self.task, advance=count)

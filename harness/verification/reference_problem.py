@@ -18,8 +18,8 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Progress
 from problems.model.scene import JointScene, Scene
+from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
 from .judge import Judgement, Reference, conditioned_limit, judge
@@ -105,45 +105,43 @@ class ReferenceProblem:
 def opened(
     scene: Scene,
     form: Form = "dual",
-    progress: Progress = lambda text, fraction: None,
+    reporter: Reporter = SILENT,
     limit_s: float | None = None,
 ) -> ReferenceProblem:
     """Open or build a scene. Raises InputError.
 
     form : that of the answers; those of the sparse form have an entry of x per unknown of the model.
     """
-    data = prepared(scene, progress, form)
+    data = prepared(scene, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
     return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
 
 
 def measurable(
     source: str,
-    progress: Progress = lambda text, fraction: None,
+    reporter: Reporter = SILENT,
     limit_s: float | None = None,
     form: Form = "dual",
 ) -> ReferenceProblem:
     """Open or build a scene, by name or path, that a solver can be measured on. Raises InputError, also if K
     is not positive definite.
     """
-    problem = opened(read_scene(source), form, progress, limit_s)
+    problem = opened(read_scene(source), form, reporter, limit_s)
     if problem.prepared.assembly.m == 0:
         allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
         raise InputError.one(source, "contacts", 0, allowed)
-    progress("factors of K", 0.0)
+    reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()
     return problem
 
 
 def reference_problem(
     source: str,
-    progress: Progress = lambda text, fraction: None,
     limit_s: float | None = None,
     form: Form = "dual",
 ) -> ReferenceProblem:
     """The same, with its reference proven."""
-    problem = measurable(source, progress, limit_s, form)
-    progress(f"reference, at most {problem.limit_s:g} s", 0.0)
+    problem = measurable(source, limit_s=limit_s, form=form)
     _ = problem.reference
     return problem
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from problems import storage
 from problems.errors import InputError
+from problems.reporter import Reporter, Stage
 from problems.stiffness import dense_block, operator
 from problems.stiffness.block import Block, NotPositiveDefinite
 from problems.stiffness.operator import Stiffness
@@ -17,7 +18,6 @@ from problems.storage import fingerprint
 
 from .assembly import Assembly, Matrix
 from .prepared import Prepared
-from .problem import Progress
 
 LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 
@@ -83,7 +83,7 @@ class DensePrepared(Prepared):
         key: str,
         before: dict[str, float],
         source_of: SourceOf,
-        progress: Progress,
+        reporter: Reporter,
     ) -> None:
         super().__init__(replace(assembly, K=Stiffness(assembly.K.blocks, self._open_factors)))
         self.blocks, A = [b for b in assembly.K.blocks if isinstance(b, dense_block.DenseBlock)], assembly.A
@@ -91,7 +91,7 @@ class DensePrepared(Prepared):
         self.factors_key = storage.digest("factors", key, code)
         parts = (A.data, A.indices, A.indptr)
         self.key = storage.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
-        self.before, self.source_of, self.progress = before, source_of, progress
+        self.before, self.source_of, self.reporter = before, source_of, reporter
 
     @property
     def built(self) -> bool:
@@ -119,7 +119,7 @@ class DensePrepared(Prepared):
         return storage.load_or_make(self.factors_key, self._make_factors)
 
     def _make_factors(self) -> storage.Entry:
-        self.progress("Cholesky factors of K", 0.0)
+        self.reporter.building(Stage.FACTORS)
         start = time.perf_counter()
         for block, name in zip(self.blocks, self.assembly.parts, strict=True):
             try:
@@ -127,7 +127,7 @@ class DensePrepared(Prepared):
             except NotPositiveDefinite as error:
                 raise indefinite(self.source_of("K"), f"K of {name}", str(error)) from error
         factored = time.perf_counter()
-        self.progress("condition number", 0.0)
+        self.reporter.building(Stage.CONDITION)
         spectrum = [block.extreme_eigenvalues() for block in self.blocks]
         least, largest = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
         if largest > LARGEST_CONDITION * least:
@@ -142,7 +142,7 @@ class DensePrepared(Prepared):
 
     def _make_schur(self) -> storage.Entry:
         self.assembly.K.ensure_factored()
-        self.progress("Q = AᵀK⁻¹A", 0.0)
+        self.reporter.building(Stage.Q)
         start = time.perf_counter()
         Q = self.assembly.K.compliance(self.assembly.A)
         return {"Q": Q}, {"seconds": time.perf_counter() - start}

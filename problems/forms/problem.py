@@ -6,7 +6,7 @@ P and G belong to the assembly, q and h to a load case. The solution z and the m
 contact forces λ and the displacements x, the same in every form.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -16,13 +16,6 @@ import scipy.sparse as sp
 from . import Form
 from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
 from .prepared import Prepared
-
-#: Called with what is being made, and the fraction done.
-Progress = Callable[[str, float], None]
-
-
-def silent(text: str, fraction: float) -> None:
-    """No progress."""
 
 
 class Problem:

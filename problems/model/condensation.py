@@ -21,6 +21,7 @@ from scipy.linalg import blas, lapack
 
 from problems import storage
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
+from problems.reporter import SILENT, Reporter, Stage
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.dense_block import mirrored
 from problems.storage import fingerprint
@@ -36,7 +37,8 @@ def condense(
     K: sp.csr_array,
     lines: Sequence[Indices],
     keep: Mask,
-    progress: Callable[[float], None] = lambda fraction: None,
+    reporter: Reporter = SILENT,
+    part: str = "",
 ) -> Matrix:
     """Schur complement of a block-tridiagonal K on the kept unknowns.
 
@@ -45,7 +47,7 @@ def condense(
     K : (N, N) symmetric positive definite, coupling only within a line and to the next.
     lines : the unknowns of each line, in their order.
     keep : (N,) bool.
-    progress : called with the fraction done.
+    part : its name, for the reporter.
 
     Returns
     -------
@@ -95,7 +97,7 @@ def condense(
         del south, north
         W = blas.dtrsm(1.0, L, rows, lower=1, overwrite_b=1)
         S = blas.dsyrk(-1.0, W, beta=1.0, c=S, trans=1, lower=1, overwrite_c=1)
-        progress(next(done) / len(lines))
+        reporter.building(Stage.CONDENSATION, next(done) / len(lines), part)
         return S
 
     return mirrored(stretch(0, len(split) - 1))
@@ -110,26 +112,26 @@ def part_key(part: PartModel) -> str:
     return storage.digest("part", part.geometry, data, code)
 
 
-def condensed_stiffness(key: str, part: PartModel, progress: Callable[[float], None]) -> tuple[Matrix, float]:
+def condensed_stiffness(key: str, part: PartModel, reporter: Reporter, name: str) -> tuple[Matrix, float]:
     """The part's stiffness on the junction nodes, (node_count, node_count) N/mm, x running fastest.
 
-    key : that of the part. Also returns the seconds of the computation.
+    key : that of the part; name : for the reporter. Also returns the seconds of the computation.
     Raises NotPositiveDefinite if some motion of the part costs no energy.
     """
 
     def made() -> storage.Entry:
         start = time.perf_counter()
-        return {"K": _condensed(part, progress)}, {"seconds": time.perf_counter() - start}
+        return {"K": _condensed(part, reporter, name)}, {"seconds": time.perf_counter() - start}
 
     arrays, facts = storage.load_or_make(key, made)
     return arrays["K"], facts["seconds"]
 
 
-def _condensed(part: PartModel, progress: Callable[[float], None]) -> Matrix:
+def _condensed(part: PartModel, reporter: Reporter, name: str) -> Matrix:
     keep = np.zeros(part.plate.size, dtype=bool)
     keep[part.deflections] = True
     lines = lines_across(part)
-    S = condense(part.stiffness(), lines, keep, progress)
+    S = condense(part.stiffness(), lines, keep, reporter, name)
     kept = np.concatenate(lines)
     order = np.argsort(kept[keep[kept]])
     return S.T.take(order, axis=0).take(order, axis=1).T  # by columns, and symmetric to the last bit

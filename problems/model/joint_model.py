@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from problems import storage
 from problems.forms.assembly import Assembly, Indices, LoadCase
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared, indefinite
-from problems.forms.problem import Progress, silent
+from problems.reporter import SILENT, Reporter
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse_block import sparse_block
@@ -180,7 +180,7 @@ class JointModel:
     def _interiors(self) -> dict[int, tuple[Indices, SparseBlock]]:
         return {}
 
-    def dense(self, progress: Progress = silent) -> DensePrepared:
+    def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K and A, memory-mapped from the cache or computed now: a dense block of K for each part, or for
         parts from the first to the last that springs join. Raises InputError as `sparse` does.
         """
@@ -189,9 +189,8 @@ class JointModel:
         joint, source_of = self.joint, self.scene.source_of
         blocks, seconds, keys = [], {}, [*map(part_key, self.parts)]
         for part, key, own in zip(joint.part, keys, self.parts, strict=True):
-            say = partial(progress, f"condensing {part.name}")
             try:
-                K, seconds[key] = condensed_stiffness(key, own, say)
+                K, seconds[key] = condensed_stiffness(key, own, reporter, part.name)
             except NotPositiveDefinite as error:
                 raise indefinite(source_of("K"), f"part.{part.name}", str(error)) from error
             blocks.append(K)
@@ -199,7 +198,7 @@ class JointModel:
         before = {"condensation": sum(seconds.values())}
         if self.springs:
             groups, key = self.springs.ranges, self.springs.key(key)
-            blocks, before["ties"] = self.springs.blocks(key, blocks, progress)
+            blocks, before["ties"] = self.springs.blocks(key, blocks, reporter)
         nodes = np.tile(joint.nodes, (len(joint.part), 1))
         assembly = Assembly(Stiffness.of(*blocks), joint.contact_matrix(), nodes, self._names(groups))
-        return DensePrepared(assembly, key, before, source_of, progress)
+        return DensePrepared(assembly, key, before, source_of, reporter)

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from problems import storage
 from problems.forms.assembly import Matrix, Vector
-from problems.forms.problem import Progress
+from problems.reporter import Reporter, Stage
 from problems.storage import fingerprint
 
 from .effect import SpringEffect
@@ -79,13 +79,13 @@ class Springs:
         """The unknowns of consecutive parts."""
         return slice(self.parts[group[0]].start, self.parts[group[-1]].stop)
 
-    def blocks(self, key: str, parts: Sequence[Matrix], progress: Progress) -> tuple[list[Matrix], float]:
+    def blocks(self, key: str, parts: Sequence[Matrix], reporter: Reporter) -> tuple[list[Matrix], float]:
         """The dense blocks of K with springs, one for each of `ranges`, from the cache or made now; and the
         seconds that making them took. key : theirs. parts : K of each part.
         """
 
         def made() -> storage.Entry:
-            progress("springs between the parts", 0.0)
+            reporter.building(Stage.SPRINGS)
             start, arrays = time.perf_counter(), {}
             for b, group in enumerate(self.ranges):
                 rows = self.rows(group)

@@ -24,8 +24,8 @@ from problems.errors import Fault, InputError
 from problems.formats import DENSEST
 from problems.forms.assembly import Assembly, LoadCase, Matrix
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
-from problems.forms.problem import Progress, silent
 from problems.input.user_matrices import SMALL, refuse_dependent
+from problems.reporter import SILENT, Reporter
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
 
@@ -84,13 +84,13 @@ class SuperelementModel:
         key = storage.digest("sparse", self._key, fingerprint([Path(__file__)], ("problems/model",)))
         return SparsePrepared(self._assembly(blocks), key, seconds, self.scene.source_of, own=True)
 
-    def dense(self, progress: Progress = silent) -> DensePrepared:
+    def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         start = time.perf_counter()
         blocks = [_dense(part.stiffness) for part in self.joint.parts]
         before = {"condensation": time.perf_counter() - start}
         if self.springs:
-            blocks, before["ties"] = self.springs.blocks(self._key, blocks, progress)
-        return DensePrepared(self._assembly(blocks), self._key, before, self.scene.source_of, progress)
+            blocks, before["ties"] = self.springs.blocks(self._key, blocks, reporter)
+        return DensePrepared(self._assembly(blocks), self._key, before, self.scene.source_of, reporter)
 
     @property
     def built(self) -> bool:

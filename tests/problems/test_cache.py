@@ -12,6 +12,7 @@ from small_joints import forbid_building, make_joint, make_scene
 from problems import build, storage
 from problems.effects.supports import Supports
 from problems.errors import InputError
+from problems.reporter import Reporter, Stage
 from problems.scene_files import read_scene
 from problems.storage import ROOT
 
@@ -144,16 +145,19 @@ def test_what_a_killed_writer_leaves_is_not_seen(root: Path, monkeypatch: pytest
 
 
 def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    steps: list[str] = []
-    first = build.prepared(SCENE, lambda text, _: steps.append(text))
+    made: list[str] = []
+    monkeypatch.setattr(Reporter, "building", lambda self, stage, *rest: made.append(stage))
+    first = build.prepared(SCENE)
     assert first.Q.shape == (20, 20)
-    assert len(steps) > 3
+    assert set(made) == {Stage.CONDENSATION, Stage.FACTORS, Stage.CONDITION, Stage.Q}
     forbid_building(monkeypatch)
-    second = build.prepared(SCENE, lambda text, _: pytest.fail(text))
+    made.clear()
+    second = build.prepared(SCENE)
     for one, other in zip(first.assembly.K.matrices, second.assembly.K.matrices, strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(first.Q, second.Q)
     assert first.facts == second.facts
+    assert not made
     for array in (second.Q, *second.assembly.K.matrices, *second.assembly.K.factors):
         assert isinstance(array, np.memmap)
         assert not array.flags.writeable
