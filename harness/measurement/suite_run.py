@@ -15,7 +15,7 @@ from rich.console import Console
 
 from harness.planning.plan import Measurement, expand, of_key, with_key
 from harness.planning.suite import Suite, to_toml
-from harness.planning.tolerance_search import due, predicted_timeout, stopped_at
+from harness.planning.tolerance_search import exceeded_on, still_needed, time_limit
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
@@ -76,7 +76,7 @@ def run(
 def unmeasured(plan: list[Measurement], rows: list[Row]) -> list[Measurement]:
     """Those without a row that need one."""
     done = {row["key"] for row in rows}
-    return [m for m in plan if m.key not in done and due(m, rows) is not None]
+    return [m for m in plan if m.key not in done and still_needed(m, rows) is not None]
 
 
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
@@ -143,7 +143,7 @@ def pending_tasks(
     opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
     made = set[str]()  # the forms whose matrices are
     for batch in batches(remaining):
-        m = due(batch[0], rows)
+        m = still_needed(batch[0], rows)
         if m is None:
             display.passed_over(len(batch))
             continue
@@ -158,10 +158,10 @@ def pending_tasks(
             _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
             made.add(m.form)
         display.progress(f"{m.scene}: {m.solver} {m.form}")
-        limit_s, stop = stopped_at(m, rows)
+        limit_s, stop = time_limit(m, rows)
         batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
-        timed_out_on = predicted_timeout(batch[0], problem.prepared.assembly.asked, rows)
-        task = Task(batch, solvers[m.solver, m.variant], timed_out_on)
+        exceeded = exceeded_on(batch[0], problem.prepared.assembly.asked, rows)
+        task = Task(batch, solvers[m.solver, m.variant], exceeded)
         yield (task, problem), task
 
 

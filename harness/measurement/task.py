@@ -27,12 +27,12 @@ from .worker import measure
 class Task:
     """What one process measures: a measurement, or load cases of a series.
 
-    timed_out_on : the scenes that predict a timeout; "" if none do.
+    exceeded_on : the scenes on which the solver exceeded its limits: nothing is run; "" if there are none.
     """
 
     batch: list[Measurement]
     solver: Description
-    timed_out_on: str = ""
+    exceeded_on: str = ""
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class TaskResult:
 def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into that directory."""
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
-    if task.timed_out_on:
-        why = f"too slow or too large already on {task.timed_out_on}"
+    if task.exceeded_on:
+        why = f"too slow or too large already on {task.exceeded_on}"
         reports = [{"status": "not_run", "message": why}] * len(batch)
     elif task.solver.failure:
         reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
