@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from harness import Answer, LoadCase, Solver, check_solver, solve
+from harness import Answer, DualLoadCase, Solver, check_solver, solve
 
 
 class Fista(Solver):
@@ -30,7 +30,7 @@ class Fista(Solver):
     def prepare(self, problem: Any) -> Any:  # once per assembly
         return problem.Q, np.linalg.eigvalsh(problem.Q)[-1]
 
-    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:  # once per load case
+    def solve(self, ready: Any, load: DualLoadCase, tolerance: float) -> Answer:  # once per load case
         Q, largest = ready
         lam = z = np.zeros(len(load.p))
         t = 1.0

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sla
 
-from solvers.base import Answer, Batch, LoadCase, Problem, Solver, WarmStart
+from solvers.base import Answer, Batch, DualLoadCase, Problem, Solver, WarmStart
 
 
 class MySolver(Solver):
@@ -55,7 +55,7 @@ class MySolver(Solver):
         """Once per assembly, timed as prepare_s: factorisations, and all else that load cases share."""
         return data
 
-    def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
+    def setup(self, state: Any, load: DualLoadCase, tolerance: float) -> Any:
         """Once per load case, timed as setup_s: the first of a series, and each that is solved by itself.
 
         state : from `prepare`, unchanged for the cases after this one.
@@ -63,11 +63,11 @@ class MySolver(Solver):
         """
         return state, load.p > 0  # closed first: the contacts that overlap before any force acts
 
-    def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
+    def update(self, state: Any, ready: Any, load: DualLoadCase, tolerance: float, start: WarmStart) -> Any:
         """Instead of `setup` for a further load case: start.lam (m,) in N is the answer of a similar one."""
         return state, start.lam > 0
 
-    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+    def solve(self, ready: Any, load: DualLoadCase, tolerance: float) -> Answer:
         """Once per load case, timed as solve_s.
 
         tolerance : how far the optimality conditions may be violated, in the solver's own sense; a
@@ -91,7 +91,7 @@ class MySolver(Solver):
         Delete it, or return None, if there is nothing to gain. Here: what cases share is what `state` holds.
         """
 
-        def solve_all(loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
+        def solve_all(loads: Sequence[DualLoadCase], tolerance: float) -> list[Answer]:
             return [self.solve(self.setup(state, load, tolerance), load, tolerance) for load in loads]
 
         return solve_all

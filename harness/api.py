@@ -37,7 +37,7 @@ from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import opened
 from problems.errors import InputError
 from problems.forms import FORMS, Form
-from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Vector
 from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
 from problems.input.matrix_entries import SYMMETRY, contradictions
@@ -49,6 +49,7 @@ from solvers.base import Answer, Solver
 
 __all__ = [
     "Answer",
+    "DualLoadCase",
     "InputError",
     "Judgement",
     "LoadCase",

@@ -27,6 +27,7 @@ from problems.errors import Fault, InputError
 from problems.forms import DENSE_FORMS as DENSE_FORMS
 from problems.forms import FORMS as FORMS
 from problems.forms import Form as Form
+from problems.forms.assembly import DualLoadCase as DualLoadCase
 from problems.forms.assembly import LoadCase as LoadCase
 from problems.forms.assembly import Vector
 from problems.forms.problem import Problem as Problem
@@ -83,6 +84,13 @@ class WarmStart:
     lam: Vector
     gap: Vector
     x: Vector | None = None
+
+
+@dataclass(frozen=True)
+class DualStart(WarmStart):
+    """A warm start whose load case has p."""
+
+    load: DualLoadCase
 
 
 class Solver(ABC):

@@ -1,6 +1,6 @@
 """The KKT residual of an approximate dual solution, and the answer that it makes.
 
-In the sparse form p is found by solutions with K (`with_p`), and the answer judged by its x (`with_x`).
+In the sparse form the answer is judged by its x (`with_x`).
 """
 
 from collections.abc import Sequence
@@ -66,12 +66,6 @@ def largest_rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:
     """4ε max_i(|p_i| + √q_ii Σ_j √q_jj |λ_j|), mm: no less than 4ε max(|p| + |Q||λ|), without Q."""
     root = np.sqrt(diagonal)
     return 4 * EPS * float((abs(p) + root * (root @ abs(lam))).max(initial=0.0))
-
-
-def with_p(prepared: Prepared, loads: Sequence[LoadCase]) -> list[LoadCase]:
-    """With p = AᵀK⁻¹f − g, (m,) mm; K⁻¹f is computed once if they share their f."""
-    columns = prepared.dual_load(stacked(loads)).T
-    return [LoadCase(load.f, load.g, p) for load, p in zip(loads, columns, strict=True)]
 
 
 def with_x(

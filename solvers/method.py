@@ -9,7 +9,7 @@ import numpy as np
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness.block import NotPositiveDefinite
 
-from .base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from .base import Answer, DualLoadCase, DualStart, Form, LoadCase, Problem, Solver, WarmStart, failed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +18,14 @@ class State:
 
     problem: Problem
     start: WarmStart | None = None
+
+    @property
+    def dual_start(self) -> DualStart | None:
+        """The solved case, with p."""
+        if self.start is None:
+            return None
+        (load,) = self.problem.prepared.with_p([self.start.load])
+        return DualStart(load, self.start.lam, self.start.gap)
 
     @property
     def Q(self) -> Matrix:
@@ -55,11 +63,11 @@ class Method(Solver):
         return State(problem=problem)
 
     @abstractmethod
-    def solved(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
-        """The answer to a load case."""
+    def solved(self, ready: Any, load: Any, tolerance: float) -> Answer:
+        """The answer to a load case: a DualLoadCase in the dual form."""
 
 
-def first_point(start: WarmStart | None, load: LoadCase) -> tuple[Vector, Vector]:
+def first_point(start: DualStart | None, load: DualLoadCase) -> tuple[Vector, Vector]:
     """λ (m,) N and y = Qλ − p (m,) mm from which a load case starts, without a product with Q."""
     if start is None:
         return np.zeros_like(load.p), -load.p

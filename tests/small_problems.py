@@ -9,7 +9,7 @@ import scipy.optimize
 import scipy.sparse as sp
 
 from harness.conformance.known_problems import contact_rows, stiffness
-from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
 
@@ -28,18 +28,18 @@ def make_strips(elements: int) -> Prepared:
     return Prepared(Assembly(Stiffness.of(K, 0.5 * K), contact_rows(elements, 0)))
 
 
-def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, LoadCase]:
+def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, DualLoadCase]:
     """Random forces (N) and gaps (mm)."""
     random = np.random.default_rng(seed)
     f = random.normal(0, force, prepared.assembly.n)
     g = random.uniform(0.01, 0.5, prepared.assembly.m)
     case = LoadCase(f, g)
-    return case, LoadCase(f, g, prepared.dual_load(case))
+    return case, prepared.with_p([case])[0]
 
 
 def solve_by_nnls(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:
     """x and λ, polished once on the active set that NNLS found."""
-    p = prepared.dual_load(case)
+    p = prepared.overlap(case)
     lam = by_nnls(prepared.Q, p)
     closed = lam > 0
     lam[closed] = np.linalg.solve(prepared.Q[np.ix_(closed, closed)], p[closed])

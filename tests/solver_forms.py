@@ -41,7 +41,7 @@ def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[An
     solver, tolerance = make_solver(name, {}), TOLERANCES.get(name, 1e-9)
     session = SolverSession(solver, in_form(prepared, form), tolerance)
     session.open()
-    answer = session.cold(LoadCase(case.f, case.g, prepared.dual_load(case)))
+    answer = session.cold(prepared.with_p([case])[0])
     if answer.lam is None or form != "dual":
         return answer, answer.x
     return answer, prepared.recover(answer.lam, case)

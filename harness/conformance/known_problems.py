@@ -14,9 +14,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from problems.forms import Form
-from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
+from problems.forms.problem import in_form, read_only
 from problems.stiffness.operator import Stiffness
 
 DOMINANT = 2e5  # N/mm, added to the diagonal of a banded K, which makes it positive definite
@@ -32,7 +32,7 @@ class KnownCase:
     """A load case with its answer: x (n,) in mm, lam (m,) in N."""
 
     name: str
-    load: LoadCase
+    load: DualLoadCase
     x: Vector
     lam: Vector
 
@@ -70,10 +70,8 @@ def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> 
     x = random.normal(0, 0.3, n)
     f = prepared.assembly.K.multiply(x) + A @ lam
     g = A.T @ x + opening
-    p = prepared.dual_load(LoadCase(f, g))
-    for array in (f, g, p):
-        array.flags.writeable = False
-    return KnownCase(name, LoadCase(f, g, p), x, lam)
+    (load,) = prepared.with_p([LoadCase(f, g)])
+    return KnownCase(name, read_only(load), x, lam)
 
 
 def known_problems(form: Form = "dual") -> list[KnownProblem]:

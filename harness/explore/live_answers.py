@@ -24,13 +24,12 @@ from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
 from problems.forms import Form
-from problems.forms.assembly import LoadCase, Vector
+from problems.forms.assembly import DualLoadCase, LoadCase, Vector
 from problems.input.bounded_types import validation_faults
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from solvers.algorithms.newton_sweeps import Sweeps
-from solvers.base import WarmStart
-from solvers.kkt import with_p
+from solvers.base import DualStart
 
 TOLERANCE_MM, PROVEN_MM = 1e-5, 1e-9  # until it is proven, and to be
 CHANGED = (*MOVED, "initial_gap", "pressure")
@@ -101,7 +100,7 @@ class Answer:
     """λ (m,) N, gap (m,) mm, and the load case. error_mm : proven, of any gap; None while it is not known."""
 
     settings: Settings
-    load: LoadCase
+    load: DualLoadCase
     lam: Vector
     gap: Vector
     error_mm: float | None = None
@@ -123,11 +122,13 @@ class Explorer:
         parts = [self.contribution(each) for each in effects if not isinstance(each, StiffnessEffect)]
         none = self.contribution(None)
         f, g = sum((f for f, _ in parts), none[0]), sum((g for _, g in parts), none[1])
-        (load,) = with_p(self.data, [LoadCase(f, g)])
+        (load,) = self.data.with_p([LoadCase(f, g)])
         return self._solved(settings, load, TOLERANCE_MM, near)
 
-    def _solved(self, settings: Settings, load: LoadCase, tolerance: float, near: Answer | None) -> Answer:
-        start = None if near is None else WarmStart(near.load, near.lam, near.gap)
+    def _solved(
+        self, settings: Settings, load: DualLoadCase, tolerance: float, near: Answer | None
+    ) -> Answer:
+        start = None if near is None else DualStart(near.load, near.lam, near.gap)
         return Answer(settings, load, *self.sweeps.vectors(self.sweeps.solved(load, tolerance, start)))
 
     def proven(self, answer: Answer) -> Answer:

@@ -26,11 +26,10 @@ from harness.verification.reference import proof_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms import Form
-from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.assembly import DualLoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
 from problems.model.scene import JointScene
 from solvers.algorithms.newton_sweeps import Case, Sweeps
-from solvers.kkt import with_p
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
 ENOUGH_MM = LIMIT_MM / 2  # a proven bound that needs no further refinement
@@ -76,7 +75,7 @@ class PlanSession:
         self.data = prepared(study.bare, form=study.form)
         self.sweeps = Sweeps(self.data)
         self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
-        self.loads: dict[int, LoadCase] = {}
+        self.loads: dict[int, DualLoadCase] = {}
         self.columns: dict[Place, tuple[Vector, Vector]] = {}
         self.starts = lru_cache(4)(lambda base, k: self._solve(self._loads(base, k), [], ESTIMATE_MM))
 
@@ -85,7 +84,7 @@ class PlanSession:
         starts = [] if question.base is None else self.starts(question.base, question.cases)
         return [self._outcome(self._loads(plan, question.cases), starts) for plan in question.plans]
 
-    def _outcome(self, loads: list[LoadCase], starts: list[Case]) -> Outcome:
+    def _outcome(self, loads: list[DualLoadCase], starts: list[Case]) -> Outcome:
         """starts : of an estimate, of each case."""
         if starts:
             cases = self._solve(loads, starts, ESTIMATE_MM)
@@ -97,12 +96,12 @@ class PlanSession:
         mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
         return Outcome(*(tuple(each.tolist()) for each in (largest + error, gaps.argmax(axis=0), mean)))
 
-    def _solve(self, loads: list[LoadCase], starts: list[Case], tolerance: float) -> list[Case]:
+    def _solve(self, loads: list[DualLoadCase], starts: list[Case], tolerance: float) -> list[Case]:
         self.sweeps.last = []
         self.sweeps(loads, tolerance, starts)
         return self.sweeps.last
 
-    def _proven(self, loads: list[LoadCase], cases: list[Case]) -> tuple[Matrix, Vector]:
+    def _proven(self, loads: list[DualLoadCase], cases: list[Case]) -> tuple[Matrix, Vector]:
         """Gaps (m, k), and how far the largest may be off (k,), mm."""
         lams = [self.sweeps.vectors(case)[0] for case in cases]
         found = assess(self.proof, loads, lams, [None] * len(loads), ENOUGH_MM)
@@ -112,17 +111,17 @@ class PlanSession:
         ]
         return np.column_stack([each.gap for each in found]), np.array(errors)
 
-    def _loads(self, plan: Plan, numbers: Sequence[int]) -> list[LoadCase]:
+    def _loads(self, plan: Plan, numbers: Sequence[int]) -> list[DualLoadCase]:
         new = [k for k in numbers if k not in self.loads]
         if new:
-            made = with_p(self.data, [self.study.cases.load(k) for k in new])
+            made = self.data.with_p([self.study.cases.load(k) for k in new])
             self.loads |= dict(zip(new, made, strict=True))
         f = self.loads[numbers[0]].f.copy()
         u = np.zeros(self.data.assembly.m)
         for place in plan:
             force, overlap = self.column(place)
             f, u = f + force, u + overlap
-        return [LoadCase(f, self.loads[k].g, self.loads[k].p + u) for k in numbers]
+        return [DualLoadCase(f, self.loads[k].g, self.loads[k].p + u) for k in numbers]
 
     def column(self, place: Place) -> tuple[Vector, Vector]:
         """f_z (n,) N and u_z (m,) mm."""

@@ -116,7 +116,7 @@ def solve(
     with step("matrices, loads and gaps"):
         problem = opened(scene, choice.form, reporter, limit_s)
         problem.prepared.assembly.K.ensure_factored()
-        p = problem.prepared.dual_load(problem.load)
+        p = problem.prepared.overlap(problem.load)
     if np.isnan(p).any():
         largest = float(abs(problem.load.f).max(initial=0.0))
         raise InputError.one(scene.source_of("f"), "largest |f|", largest, "loads with finite displacements")

@@ -232,7 +232,7 @@ def candidates(prepared: Prepared, load: LoadCase) -> Iterator[tuple[str, Vector
 
     None is run where no contact overlaps.
     """
-    if not (prepared.dual_load(load) > 0).any():
+    if not (prepared.overlap(load) > 0).any():
         yield NO_CONTACT, np.zeros(prepared.assembly.m)
         return
     from solvers.registry import make_solver  # slow to import

@@ -37,7 +37,7 @@ def about(prepared: Prepared, load: LoadCase) -> Vector:
 
     x = K⁻¹(f − Aλ) with λ = α max(p, 0), α such that the dual objective ½λᵀQλ − pᵀλ is least.
     """
-    p, A = prepared.dual_load(load), prepared.assembly.A
+    p, A = prepared.overlap(load), prepared.assembly.A
     w = np.maximum(p, 0.0)
     curvature = float(w @ (A.T @ prepared.assembly.K.solve(A @ w)))
     return prepared.recover(w * (float(w @ p) / (curvature or 1.0)), load)

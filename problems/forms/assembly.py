@@ -74,20 +74,44 @@ class Assembly:
 
 @dataclass(frozen=True)
 class LoadCase:
-    """One load case.
+    """One load case on an assembly, as a scene or a user gives it.
 
-    f : (n,) nodal forces, N. g : (m,) initial gaps, mm.
-    p : (m,) AᵀK⁻¹f − g, mm, the overlap of the parts if contact is ignored; formed by the dual form only.
-    energy : N·mm per unit of the objective, for the tolerance of a duality gap; not 1 in other units only.
+    Parameters
+    ----------
+    f : array (n,), N
+        Nodal forces, an entry per unknown of K.
+    g : array (m,), mm
+        Initial gaps at the contacts; negative where the parts overlap.
+    energy : float, N·mm
+        The energy that a unit of the objective stands for: 1 in mm and N. A solver that stops by a duality
+        gap divides its tolerance by it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> LoadCase(f=np.array([10.0, 0.0]), g=np.array([0.3])).energy
+    1.0
     """
 
     f: Vector
     g: Vector
-    p: Vector = field(default_factory=lambda: np.zeros(0))
-    energy: float = 1.0
+    energy: float = field(default=1.0, kw_only=True)
+
+
+@dataclass(frozen=True)
+class DualLoadCase(LoadCase):
+    """A load case of the dual form, min ½λᵀQλ − pᵀλ, λ ≥ 0; `Prepared.with_p` makes it.
+
+    Parameters
+    ----------
+    p : array (m,), mm
+        AᵀK⁻¹f − g, the overlap of the parts if contact is ignored.
+    """
+
+    p: Vector
 
     def __sub__(self, other: Self) -> Self:
-        """What changes from the other one to this."""
+        """The change from the other load case to this one."""
         return replace(self, f=self.f - other.f, g=self.g - other.g, p=self.p - other.p)
 
 

@@ -13,7 +13,7 @@ from problems.stiffness.block import scaled
 from problems.stiffness.operator import ScaledStiffness, Stiffness
 
 from . import Form
-from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
+from .assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector, stacked
 from .compliance import (
     ApproximateInverse,
     Compliance,
@@ -126,12 +126,21 @@ class Prepared:
         """With DKD, by the factors of K, and DAR, for powers of two D (n,) and R (m,)."""
         return _Scaled(self, D, R)
 
-    def dual_load(self, load: LoadCase) -> Vector:
+    def overlap(self, load: LoadCase) -> Vector:
         """p = AᵀK⁻¹f − g, (m,), mm: the overlap of the parts if contact is ignored."""
         return self.assembly.A.T @ self.assembly.K.solve(load.f) - load.g
 
-    def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
-        """y = g − Aᵀx of x = K⁻¹(f − Aλ), (m, k) mm for λ (m, k); loads : with p where K is dense.
+    def with_p(self, loads: Sequence[LoadCase]) -> list[DualLoadCase]:
+        """The load cases with p, unless all have it already; K⁻¹f is computed once if they share their f."""
+        dual = [load for load in loads if isinstance(load, DualLoadCase)]
+        if len(dual) == len(loads):
+            return dual
+        columns = self.overlap(stacked(loads)).T
+        pairs = zip(loads, columns, strict=True)
+        return [DualLoadCase(load.f, load.g, np.ascontiguousarray(p)) for load, p in pairs]
+
+    def gaps(self, lam: Matrix, loads: Sequence[DualLoadCase]) -> Matrix:
+        """y = g − Aᵀx of x = K⁻¹(f − Aλ), (m, k) mm for λ (m, k).
 
         Qλ − p with a matrix Q; else by one solution with K, as Qλ and p can be large, and cancel.
         """

@@ -8,14 +8,16 @@ contact forces λ and the displacements x, the same in every form.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 
 from . import Form
-from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
+from .assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector, stacked
 from .prepared import Prepared
+
+AnyLoadCase = TypeVar("AnyLoadCase", bound=LoadCase)
 
 
 class Problem:
@@ -60,7 +62,7 @@ class Problem:
         """The right-hand side of Gz ≤ h; None if bounds replace it."""
         return load.g
 
-    def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
+    def loads(self, cases: Sequence[LoadCase]) -> Sequence[LoadCase]:
         """The load cases with what this form adds to them, read-only."""
         return [read_only(case) for case in cases]
 
@@ -132,16 +134,17 @@ class Dual(Problem):
         return None
 
     def q(self, load: LoadCase) -> Vector:
-        return -load.p
+        return -self._p(load)
 
     def h(self, load: LoadCase) -> None:
         return None
 
-    def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
-        """With p; K⁻¹f is computed once if they share their f."""
-        p = self.prepared.dual_load(stacked(cases)).T
-        pairs = zip(cases, p, strict=True)
-        return [read_only(LoadCase(case.f, case.g, np.ascontiguousarray(mine))) for case, mine in pairs]
+    def _p(self, load: LoadCase) -> Vector:
+        return self.prepared.with_p([load])[0].p
+
+    def loads(self, cases: Sequence[LoadCase]) -> Sequence[DualLoadCase]:
+        """The load cases with p."""
+        return [read_only(case) for case in self.prepared.with_p(cases)]
 
     def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
         return z, None
@@ -150,11 +153,11 @@ class Dual(Problem):
         return lam, gap
 
     def gap(self, load: LoadCase, lam: Vector, x: Vector | None) -> Vector:
-        return self.Q @ lam - load.p
+        return self.Q @ lam - self._p(load)
 
     def distance(self, one: LoadCase, other: LoadCase) -> float:
         """‖p − p'‖₂, mm."""
-        return float(np.linalg.norm(one.p - other.p))
+        return float(np.linalg.norm(self._p(one) - self._p(other)))
 
     @property
     def arrays(self) -> list[Matrix]:
@@ -191,9 +194,11 @@ def in_form(prepared: Prepared, form: Form) -> Problem:
     return classes[form](prepared)
 
 
-def read_only(load: LoadCase) -> LoadCase:
+def read_only(load: AnyLoadCase) -> AnyLoadCase:
     """The load case as read-only views: a solver cannot write, and the caller's own arrays stay writable."""
-    f, g, p = load.f.view(), load.g.view(), load.p.view()
-    for view in (f, g, p):
+    views: dict[str, Any] = {
+        name: value.view() for name, value in vars(load).items() if isinstance(value, np.ndarray)
+    }
+    for view in views.values():
         view.flags.writeable = False
-    return replace(load, f=f, g=g, p=p)
+    return replace(load, **views)

@@ -28,7 +28,7 @@ import numpy as np
 
 from problems.stiffness import power_of_two
 
-from .assembly import LoadCase, Vector
+from .assembly import DualLoadCase, LoadCase, Vector
 from .problem import Problem, in_form, read_only
 
 USUAL = 2.0**8  # mm: displacements between this and its inverse need no unit of their own
@@ -100,8 +100,10 @@ class Units:
     def load(self, load: LoadCase) -> LoadCase:
         if self.own:
             return load
-        p = self.R * load.p / self.U if load.p.size else load.p
-        return read_only(LoadCase(self.D * load.f / self.U, self.R * load.g / self.U, p, self.U**2))
+        f, g, energy = self.D * load.f / self.U, self.R * load.g / self.U, self.U**2
+        if isinstance(load, DualLoadCase):
+            return read_only(DualLoadCase(f, g, self.R * load.p / self.U, energy=energy))
+        return read_only(LoadCase(f, g, energy=energy))
 
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector, Vector, Vector | None]:
         """λ, gaps and x of a warm start."""

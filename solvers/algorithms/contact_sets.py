@@ -34,7 +34,7 @@ from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
 from problems.stiffness.block import SparseBlock
 from problems.stiffness.sparse_block import sparse_block
-from solvers.base import LoadCase
+from solvers.base import DualLoadCase
 
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
 
@@ -130,8 +130,8 @@ class ContactSprings:
             change = np.where(C, change + rho * (closed - y), -lam)
         return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
 
-    def first_set(self, load: LoadCase) -> Mask:
-        """(m,) the contacts that overlap with springs as stiff as K. load : with p.
+    def first_set(self, load: DualLoadCase) -> Mask:
+        """(m,) the contacts that overlap with springs as stiff as K.
 
         As `yielding_set`, from λ = 0: one step of Newton's method per ρ, from the stiffness of the body to
         that of K.

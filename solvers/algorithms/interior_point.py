@@ -158,7 +158,7 @@ def algorithm_5(Q: Matrix, p: Vector) -> Start:
 def algorithm_4(prepared: Prepared, load: LoadCase) -> Start:
     """The same from displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
     A, K = prepared.assembly.A, prepared.assembly.K
-    return _opened(lambda lam: A.T @ K.solve(A @ lam), prepared.dual_load(load))
+    return _opened(lambda lam: A.T @ K.solve(A @ lam), prepared.overlap(load))
 
 
 def _opened(response: Callable[[Vector], Vector], p: Vector) -> Start:

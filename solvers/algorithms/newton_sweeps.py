@@ -30,7 +30,7 @@ import numpy as np
 
 from problems.forms.assembly import Mask, Vector
 from problems.forms.prepared import Prepared
-from solvers.base import Answer, LoadCase, Status, WarmStart
+from solvers.base import Answer, DualLoadCase, DualStart, Status
 from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
 
 from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
@@ -55,7 +55,7 @@ class Case:
     the rounding that y has brought along since it was last computed anew, mm; infinite if y is not known.
     """
 
-    load: LoadCase
+    load: DualLoadCase
     C: Mask
     trial: TrialSolution
     factor: OpenFactor | None = None
@@ -96,9 +96,9 @@ class Sweeps:
         return ContactSprings(self.prepared)
 
     def __call__(
-        self, loads: Sequence[LoadCase], tolerance: float, starts: Sequence[Case] = ()
+        self, loads: Sequence[DualLoadCase], tolerance: float, starts: Sequence[Case] = ()
     ) -> list[Answer]:
-        """An answer to each load, all with p, solved together. starts : of each; else the nearest case of the
+        """An answer to each load, solved together. starts : of each; else the nearest case of the
         last ones.
         """
         if not starts:
@@ -110,9 +110,9 @@ class Sweeps:
         return [self.answer(case, tolerance) for case in self.last]
 
     def solved(
-        self, load: LoadCase, tolerance: float, start: WarmStart | None = None, C: Mask | None = None
+        self, load: DualLoadCase, tolerance: float, start: DualStart | None = None, C: Mask | None = None
     ) -> Case:
-        """The case of a load with p, from nothing or from a solved one. C : its first set, if it is known."""
+        """The case of a load, from nothing or from a solved one. C : its first set, if it is known."""
         order = self.order
         if start is None:
             zero = np.zeros(len(order))
@@ -158,7 +158,7 @@ class Sweeps:
         lam[self.order], y[self.order] = np.maximum(case.trial.lam, 0.0), case.trial.y
         return lam, y
 
-    def _begun(self, solved: Sequence[Case], loads: Sequence[LoadCase]) -> list[Case]:
+    def _begun(self, solved: Sequence[Case], loads: Sequence[DualLoadCase]) -> list[Case]:
         """Load cases that start from the solutions of others, and from the forces αw of a change of f."""
         changes = [load - case.load for case, load in zip(solved, loads, strict=True)]
         w = np.column_stack([self.A.T @ change.f / self.squares for change in changes])
@@ -260,6 +260,6 @@ class Sweeps:
         case.settled = right and residual <= enough
 
 
-def _nearest(cases: Sequence[Case], load: LoadCase) -> Case:
+def _nearest(cases: Sequence[Case], load: DualLoadCase) -> Case:
     """The case with the nearest p."""
     return min(cases, key=lambda case: float(np.linalg.norm(case.load.p - load.p)))

@@ -60,7 +60,11 @@ class GoldfarbIdnani(Method):
 
     def solved(self, ready: _Prepared, load: LoadCase, tolerance: float) -> Answer:
         data = ready.problem
-        slacks = _primal_slacks(ready, load) if ready.U is None else _dual_slacks(ready, load)
+        if ready.U is None:
+            slacks = _primal_slacks(ready, load)
+        else:
+            p = data.prepared.with_p([load])[0].p
+            slacks = _dual_slacks(ready, p)
         limit = MAX_PIVOTS * len(ready.G) + 10
         result = goldfarb_idnani(ready.G, slacks, tolerance, limit)
         if not np.isfinite(result.u).all():
@@ -74,23 +78,23 @@ class GoldfarbIdnani(Method):
                 result.status, lam, data.prepared.recover(lam, load), result.pivots, details=details
             )
         if result.status == "inaccurate":
-            return _finished(ready, load, result, tolerance, details)
-        lam = _on_support(ready, load, slacks(result.u)[0], result)
-        status, residual = kkt_status(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
+            return _finished(ready, p, result, tolerance, details)
+        lam = _on_support(ready, p, slacks(result.u)[0], result)
+        status, residual = kkt_status(data.Q, p, lam, data.Q @ lam - p, tolerance)
         if status == "inaccurate" and result.status == "solved":
-            return _finished(ready, load, result, tolerance, details)
+            return _finished(ready, p, result, tolerance, details)
         details["kkt_residual_mm"] = residual
         status = "solved" if status == "solved" else result.status
         return Answer(status, lam, None, result.pivots, details=details)
 
 
 def _finished(
-    ready: _Prepared, load: LoadCase, result: GiResult, tolerance: float, details: dict[str, Any]
+    ready: _Prepared, p: Vector, result: GiResult, tolerance: float, details: dict[str, Any]
 ) -> Answer:
     """Block pivoting from the final set of the pivots, if rounding in Q⁻¹ made them inaccurate."""
-    closed = np.ones(len(load.p), dtype=bool)
+    closed = np.ones(len(p), dtype=bool)
     closed[result.active] = False
-    answer = solve_from(closed, ready.problem.Q, load.p, tolerance)
+    answer = solve_from(closed, ready.problem.Q, p, tolerance)
     details |= {"finishing_sets": answer.iterations, "kkt_residual_mm": answer.details["kkt_residual_mm"]}
     if answer.status == "solved":
         details.pop("cause", None)
@@ -137,7 +141,7 @@ def _primal_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
     return slacks
 
 
-def _dual_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
+def _dual_slacks(ready: _Prepared, p: Vector) -> Slacks:
     Q, factor = ready.Q, (ready.U, False)
 
     def slacks(u: Vector) -> tuple[Vector, Vector]:
@@ -145,14 +149,14 @@ def _dual_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
 
         εT with T = |Q⁻¹| (|p + u| + |Q| |λ|) bounds the effect of rounding in the residual.
         """
-        lam = sla.cho_solve(factor, load.p + u, check_finite=False)
-        lam += sla.cho_solve(factor, load.p + u - Q @ lam, check_finite=False)
-        return lam, abs(ready.G) @ (abs(load.p + u) + abs(Q) @ abs(lam))
+        lam = sla.cho_solve(factor, p + u, check_finite=False)
+        lam += sla.cho_solve(factor, p + u - Q @ lam, check_finite=False)
+        return lam, abs(ready.G) @ (abs(p + u) + abs(Q) @ abs(lam))
 
     return slacks
 
 
-def _on_support(ready: _Prepared, load: LoadCase, lam: Vector, result: GiResult) -> Vector:
+def _on_support(ready: _Prepared, p: Vector, lam: Vector, result: GiResult) -> Vector:
     """λ with λ_C = 0 exactly and Q_SS λ_S = p_S refined on the rest S, so that no rounding of λ_C remains.
 
     With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). Entries that are then negative, at
@@ -163,7 +167,7 @@ def _on_support(ready: _Prepared, load: LoadCase, lam: Vector, result: GiResult)
         lam = lam.copy()
         for _ in range(2):
             lam[C] = 0.0
-            r = load.p - Q @ lam
+            r = p - Q @ lam
             r[C] = 0.0
             v = sla.cho_solve((ready.U, False), r, check_finite=False)
             u = np.zeros_like(v)

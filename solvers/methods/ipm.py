@@ -25,7 +25,7 @@ from solvers.algorithms.interior_point import (
 )
 from solvers.algorithms.newton_system import NewtonSystem
 from solvers.algorithms.preconditioner import SYSTEMS, OpenLast
-from solvers.base import Answer, LoadCase, Problem, Status, one_of, require
+from solvers.base import Answer, DualLoadCase, Problem, Status, one_of, require
 from solvers.kkt import largest_rounding
 from solvers.method import Method, State
 
@@ -98,7 +98,7 @@ class Ipm(Method):
         kind = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
         return _State(problem=problem, system=kind(problem.Q))
 
-    def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: _State, load: DualLoadCase, tolerance: float) -> Answer:
         Q, system = ready.Q, ready.system
         tolerance /= load.energy**0.5
         system.begin()
@@ -132,7 +132,7 @@ class Ipm(Method):
             details=details,
         )
 
-    def _start(self, problem: Problem, load: LoadCase, details: dict[str, Any]) -> Start:
+    def _start(self, problem: Problem, load: DualLoadCase, details: dict[str, Any]) -> Start:
         match self.start:
             case "stp1":
                 return stp1(problem.Q, load.p, RHO)

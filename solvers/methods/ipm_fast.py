@@ -13,7 +13,7 @@ import numpy as np
 from solvers.algorithms.interior_point import NewtonSteps, mehrotra, stp2
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.algorithms.newton_system import Banded, Direct, NewtonSystem
-from solvers.base import Answer, LoadCase, Problem, failed
+from solvers.base import Answer, DualLoadCase, Problem, failed
 from solvers.method import Method, State
 
 THETA = 0.995
@@ -48,7 +48,7 @@ class FastIpm(Method):
         system = Banded(problem.Q, finish.M) if finish.M else Direct(problem.Q)
         return _State(problem=problem, system=system, finish=finish)
 
-    def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: _State, load: DualLoadCase, tolerance: float) -> Answer:
         Q, p, system = ready.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()

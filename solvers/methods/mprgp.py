@@ -9,7 +9,7 @@ precondition the face alone is not enough: Q is a compliance, so a gradient step
 smooth fields only, and the face changes contact by contact.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from problems.forms.assembly import Vector
@@ -17,7 +17,7 @@ from problems.forms.banded_inverse import BandedInverse
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
 from solvers.base import Answer, Form, LoadCase, Problem, failed, one_of, require
-from solvers.kkt import judged, kkt_residual, largest_rounding, with_p, with_x
+from solvers.kkt import judged, kkt_residual, largest_rounding, with_x
 from solvers.method import Method, State, first_point
 
 PRECONDITIONERS = ("band", "face", "none")
@@ -72,21 +72,17 @@ class Mprgp(Method):
         return kind(ready.diagonal, ready.alpha, OpenFactor(ready.M))
 
     def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
-        prepared, sparse, start = ready.problem.prepared, "x" in ready.problem.needs, ready.start
-        given = with_p(prepared, [load])[0] if sparse else load
-        if sparse and start is not None:
-            start = replace(start, load=with_p(prepared, [start.load])[0])
+        prepared, metric = ready.problem.prepared, self._metric(ready)
+        (dual,) = prepared.with_p([load])
 
         def gaps(lam: Vector) -> Vector:
-            return prepared.gaps(lam[:, None], [given])[:, 0]
+            return prepared.gaps(lam[:, None], [dual])[:, 0]
 
-        metric = self._metric(ready)
-        case = Proportioning(
-            prepared.compliance, given.p, ready.diagonal, metric, gaps, *first_point(start, given)
-        )
+        first = first_point(ready.dual_start, dual)
+        case = Proportioning(prepared.compliance, dual.p, ready.diagonal, metric, gaps, *first)
         enough = case.solve(tolerance, MAX_PRODUCTS)
         residual = kkt_residual(case.lam, case.y)
-        solved = residual <= max(tolerance, largest_rounding(ready.diagonal, given.p, case.lam))
+        solved = residual <= max(tolerance, largest_rounding(ready.diagonal, dual.p, case.lam))
         answer = judged(
             "solved" if solved else "inaccurate",
             case.lam,
@@ -96,4 +92,4 @@ class Mprgp(Method):
             iterations=sum(case.steps.values()),
             inner_iterations=metric.sets,
         )
-        return with_x(prepared, [answer], [load], tolerance)[0] if sparse else answer
+        return with_x(prepared, [answer], [load], tolerance)[0] if "x" in ready.problem.needs else answer

@@ -11,12 +11,12 @@ all over an area, the equations of each set are solved with a factorisation of K
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import Answer, Batch, Form, LoadCase, Problem
-from solvers.kkt import with_p, with_x
+from solvers.kkt import with_x
 from solvers.method import Method, State
 
 
@@ -26,16 +26,13 @@ class _State(State):
 
     def solve(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """One load case, or several together."""
-        prepared, sweeps, start = self.problem.prepared, self.sweeps, self.start
-        sparse = "x" in self.problem.needs
-        given = with_p(prepared, loads) if sparse else loads
-        if len(given) == 1:
-            if start is not None and sparse:
-                start = replace(start, load=with_p(prepared, [start.load])[0])
-            found = [sweeps.answer(sweeps.solved(given[0], tolerance, start), tolerance)]
+        prepared, sweeps = self.problem.prepared, self.sweeps
+        dual = prepared.with_p(loads)
+        if len(dual) == 1:
+            answers = [sweeps.answer(sweeps.solved(dual[0], tolerance, self.dual_start), tolerance)]
         else:
-            found = sweeps(given, tolerance)
-        return with_x(prepared, found, loads, tolerance) if sparse else found
+            answers = sweeps(dual, tolerance)
+        return with_x(prepared, answers, loads, tolerance) if "x" in self.problem.needs else answers
 
 
 class ActiveSetNewton(Method):

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 from problems.forms.assembly import Vector
 from solvers.adapter import answer
-from solvers.base import Answer, LoadCase, Status
+from solvers.base import Answer, DualLoadCase, Status
 from solvers.method import Method, State, first_point
 
 LIMIT = 1_000_000  # iterations, and products with Q
@@ -24,8 +24,8 @@ class LBfgsB(Method):
 
     distribution: ClassVar[str | None] = "scipy"
 
-    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
-        Q, (start, _) = ready.Q.T, first_point(ready.start, load)  # symmetric
+    def solved(self, ready: State, load: DualLoadCase, tolerance: float) -> Answer:
+        Q, (start, _) = ready.Q.T, first_point(ready.dual_start, load)  # symmetric
 
         def objective(lam: Vector) -> tuple[float, Vector]:
             """½λᵀQλ − pᵀλ, N·mm, and its gradient y = Qλ − p, mm."""

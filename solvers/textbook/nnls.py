@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 
 from problems.forms.assembly import Matrix
 from solvers.adapter import answer
-from solvers.base import Answer, LoadCase, Problem
+from solvers.base import Answer, DualLoadCase, Problem
 from solvers.method import Method, State
 
 LIMIT = 100  # iterations, in units of m
@@ -32,7 +32,7 @@ class Nnls(Method):
     def state(self, problem: Problem) -> _State:
         return _State(problem=problem, U=sla.cholesky(problem.Q.T))
 
-    def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: _State, load: DualLoadCase, tolerance: float) -> Answer:
         details = {"tolerance": "not taken"}
         b = sla.solve_triangular(ready.U, load.p, trans="T")
         try:

@@ -17,7 +17,7 @@ from scipy.linalg import blas
 
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness.dense_block import product
-from solvers.base import Answer, LoadCase, require
+from solvers.base import Answer, DualLoadCase, require
 from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
 from solvers.method import Method, State, first_point
 
@@ -45,9 +45,9 @@ class ProjectedGaussSeidel(Method):
         valid = 0 < self.relaxation < 2
         require("projected-gauss-seidel", vars(self), relaxation=(valid, "must be between 0 and 2"))
 
-    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: State, load: DualLoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
-        lam, y = first_point(ready.start, load)
+        lam, y = first_point(ready.dual_start, load)
         products, sweeps = 0, 0
         reached: list[float] = []  # the residual at each check
         limit = cause = ""

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sla
 
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import DualLoadCase
 from solvers.base import Answer
 from solvers.kkt import judged, kkt_status
 from solvers.method import Method, State
@@ -30,7 +30,7 @@ class TextbookActiveSet(Method):
     Iterations are the sets, each factored anew.
     """
 
-    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: State, load: DualLoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
         closed = p > 0 if ready.start is None else ready.start.lam > 0
         lam, y, wrong, sets = np.zeros_like(p), -p, np.ones_like(closed), 0

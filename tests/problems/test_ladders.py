@@ -18,7 +18,6 @@ from harness.verification.reference import best_of_candidates
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
 from problems.build import prepared
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase
 from problems.forms.problem import in_form
 from problems.ladders import ladders, make_rung, rung_names
 from problems.ladders.manufactured import contacts, exact_assembly, spectrum, two_parts
@@ -118,7 +117,7 @@ def judged(name: str, solver: str, form: Form, tolerance: float) -> tuple[Answer
     data, case = base.prepared, base.load
     session = SolverSession(make_solver(solver, {}), in_form(data, form), tolerance)
     session.open()
-    answer = session.next(LoadCase(case.f, case.g, data.dual_load(case)), None)
+    answer = session.next(data.with_p([case])[0], None)
     assert np.isfinite(answer.lam).all()
     x = answer.x if answer.x is not None else data.recover(answer.lam, case)
     return answer, judge(data, case, base.reference, x, answer.lam, base.limit_mm(1e-7)).verdict

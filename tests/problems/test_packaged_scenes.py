@@ -155,4 +155,4 @@ def test_active_constraints_of_the_paper(data: Prepared, count: int) -> None:
     lam = solve("newton", "sparse", data, case)[0].lam
     assert abs(int((lam > 0).sum()) - count) <= 22  # 1 % of m
     assert lam.min() >= 0
-    assert (data.compliance @ lam - data.dual_load(case)).min() > -1e-9
+    assert (data.compliance @ lam - data.overlap(case)).min() > -1e-9

@@ -190,7 +190,7 @@ def test_a_scene_with_a_mechanism_is_bad_input_that_says_where_it_moves(
     allowed = []
     for form in FORMS:
         with pytest.raises(InputError) as caught:
-            prepared(scene, form=form).dual_load(load_case(scene, form))
+            prepared(scene, form=form).overlap(load_case(scene, form))
         (fault,) = caught.value.faults
         assert str(tmp_path / "own.npz") in str(caught.value)
         allowed.append(fault.allowed)

@@ -66,7 +66,7 @@ def check_same(scene: JointScene) -> None:
     for found, expected in (
         (model.at_junction(whole.assembly.K.solve(load.f)), dense.assembly.K.solve(case.f)),
         (model.at_junction(whole.assembly.K.solve(whole_force)), dense.assembly.K.solve(force)),
-        (whole.dual_load(load), dense.dual_load(case)),
+        (whole.overlap(load), dense.overlap(case)),
         (whole.compliance @ lam, dense.Q @ lam),
     ):
         np.testing.assert_allclose(found, expected, rtol=0, atol=2e-9 * abs(expected).max(initial=0.0))

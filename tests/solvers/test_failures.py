@@ -9,7 +9,7 @@ from small_problems import make_load, make_strips
 from solver_forms import IN_HOUSE
 
 from harness.solving.session import SolverSession
-from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.assembly import Assembly, DualLoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.stiffness.operator import Stiffness
@@ -17,7 +17,7 @@ from solvers.base import Answer, Form
 from solvers.registry import make_solver
 
 
-def answered(name: str, form: Form, prepared: Prepared, load: LoadCase, **options: Any) -> Answer:
+def answered(name: str, form: Form, prepared: Prepared, load: DualLoadCase, **options: Any) -> Answer:
     session = SolverSession(make_solver(name, options), in_form(prepared, form), 1e-10)
     session.open(batched=False)
     return session.next(load, None)
@@ -31,7 +31,7 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(name: 
         prepared = Prepared(Assembly(Stiffness.of(sp.csc_array(K)), A))
     else:
         prepared = Prepared(Assembly(Stiffness.of(abs(K)), A), np.diag([1.0, -2.0, 3.0]))
-    answer = answered(name, form, prepared, LoadCase(np.ones(10), np.zeros(3), np.ones(3)))
+    answer = answered(name, form, prepared, DualLoadCase(np.ones(10), np.zeros(3), np.ones(3)))
     assert (answer.status, answer.lam) == ("failed", None)
     assert "definite" in answer.details["cause"]
 

@@ -11,7 +11,7 @@ from sample_size import ASKED
 from small_problems import by_nnls, definite, make_load, make_prepared, solve_by_nnls
 
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import DualLoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.algorithms.interior_point import NewtonSteps, Point, algorithm_3, algorithm_5, mehrotra
@@ -33,7 +33,7 @@ COMBINATIONS = [
 def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = 1e-14, **options: Any) -> Answer:
     solver = Ipm(**options)
     ready = solver.prepare(SimpleNamespace(Q=Q))  # type: ignore[arg-type]
-    return solver.solve(ready, LoadCase(np.zeros(0), np.zeros(0), p), tolerance)
+    return solver.solve(ready, DualLoadCase(np.zeros(0), np.zeros(0), p), tolerance)
 
 
 def drawn(size: int, seed: int, condition: float = 1e4) -> tuple[np.ndarray, np.ndarray]:

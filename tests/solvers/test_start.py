@@ -49,7 +49,7 @@ def test_algorithms_4_and_5_give_the_same_point(seed: int) -> None:
     prepared = make_prepared(seed, pairs=14, tools=3)
     load, _ = make_load(seed, prepared)
     by_x = algorithm_4(prepared, load)
-    by_Q = algorithm_5(prepared.Q, prepared.dual_load(load))
+    by_Q = algorithm_5(prepared.Q, prepared.overlap(load))
     np.testing.assert_allclose(by_x.lam, by_Q.lam, rtol=1e-9)
     np.testing.assert_allclose(by_x.y, by_Q.y, rtol=1e-7, atol=1e-9 * abs(by_Q.y).max())
     assert (by_x.corrections, by_x.multiplications) == (by_Q.corrections, by_Q.multiplications)

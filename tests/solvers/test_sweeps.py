@@ -14,7 +14,7 @@ from strip_scene import write_strip
 from harness.conformance.known_problems import contact_rows
 from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
-from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.assembly import Assembly, DualLoadCase, LoadCase
 from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
 from problems.forms.compliance import DenseCompliance, of_dense
 from problems.forms.prepared import Prepared, dual_alone
@@ -27,7 +27,6 @@ from solvers.algorithms import newton_sweeps
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import Answer, WarmStart
-from solvers.kkt import with_p
 from solvers.registry import make_solver
 
 TOLERANCE = 1e-10
@@ -68,7 +67,7 @@ def session_of(data: Prepared, form: str, tolerance: float = TOLERANCE) -> Solve
 
 
 def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = TOLERANCE) -> Answer:
-    return session_of(dual_alone(Q), "dual", tolerance).next(LoadCase(p * 0, -p, p), None)
+    return session_of(dual_alone(Q), "dual", tolerance).next(DualLoadCase(p * 0, -p, p), None)
 
 
 def residual(Q: np.ndarray, p: np.ndarray, lam: np.ndarray | None) -> float:
@@ -211,7 +210,7 @@ def test_an_edge_of_contact_on_a_fine_mesh_moves_in_few_sets(half_waves: int, le
     Q = np.linalg.inv(1e4 * D.T @ D + 1e-2 * np.eye(600))
     own = Sweeps(dual_alone(np.asfortranarray((Q + Q.T) / 2)))
     p, start = level + np.cos(half_waves * np.pi * x), None
-    for load in (LoadCase(0 * q, -q, q) for q in (p, np.roll(p, 80))):
+    for load in (DualLoadCase(0 * q, -q, q) for q in (p, np.roll(p, 80))):
         case = own.solved(load, 1e-8, start)
         assert own.answer(case, 1e-8).status == "solved"
         assert case.sets <= 15
@@ -224,11 +223,11 @@ def test_forces_at_contacts_go_into_the_contacts_below(tmp_path: Path, form: Any
     (tmp_path / "joint.toml").write_text(two_parts(length=200.0, nodes=(21, 4)) + PRESSED)
     scene = read_scene(str(tmp_path / "joint.toml"))
     data = prepared(scene, form=form)
-    (load,) = with_p(data, [load_case(scene, form)])
+    (load,) = data.with_p([load_case(scene, form)])
     own = Sweeps(data)
     case = own.solved(load, TOLERANCE)
     w = np.where(own.vectors(case)[0] > 0, np.random.default_rng(0).uniform(1.0, 2.0, len(load.g)), 0.0)
-    near, far = with_p(data, [LoadCase(load.f + data.assembly.A @ w, load.g + gap) for gap in (0.0, 1e3)])
+    near, far = data.with_p([LoadCase(load.f + data.assembly.A @ w, load.g + gap) for gap in (0.0, 1e3)])
     (begun,) = own._begun([case], [near])
     np.testing.assert_allclose(begun.trial.lam, case.trial.lam + w[own.order], rtol=1e-9)
     np.testing.assert_allclose(begun.trial.y, case.trial.y, atol=1e-9)
@@ -243,7 +242,7 @@ def test_forces_at_contacts_of_unlike_lengths_are_the_contacts_own() -> None:
     lengths = np.geomspace(0.1, 10.0, made.assembly.m)
     data = Prepared(replace(made.assembly, A=sp.csc_array(made.assembly.A.multiply(lengths))))
     w = np.random.default_rng(0).uniform(1.0, 2.0, len(lengths))
-    nothing, load = with_p(data, [LoadCase(data.assembly.A @ v, 0.0 * w) for v in (0.0 * w, w)])
+    nothing, load = data.with_p([LoadCase(data.assembly.A @ v, 0.0 * w) for v in (0.0 * w, w)])
     own = Sweeps(data)
     (begun,) = own._begun([own.solved(nothing, TOLERANCE)], [load])
     np.testing.assert_allclose(begun.trial.lam, w[own.order], rtol=1e-9)
@@ -254,7 +253,7 @@ def test_a_contact_that_a_change_of_load_opens_has_no_force_left(opened: int) ->
     """λ + αw is below zero there, and the set stays as it is: the step is taken whole."""
     data, w = make_prepared(3, 12), np.random.default_rng(opened).uniform(1.0, 2.0, 12)
     other = np.where(np.arange(12) == opened, -3 * w, w)
-    pressed, less = with_p(data, [LoadCase(data.assembly.A @ v, np.zeros(12)) for v in (w, other)])
+    pressed, less = data.with_p([LoadCase(data.assembly.A @ v, np.zeros(12)) for v in (w, other)])
     own = Sweeps(data)
     (begun,) = own._begun([own.solved(pressed, TOLERANCE)], [less])
     assert (begun.trial.lam[~begun.C] < 0).any()
@@ -266,11 +265,11 @@ def test_a_contact_that_a_change_of_load_opens_has_no_force_left(opened: int) ->
 def test_a_start_whose_forces_and_gaps_do_not_belong_together_costs_sweeps_alone(scale: float) -> None:
     Q, random = decaying(), np.random.default_rng(0)
     own, p = Sweeps(dual_alone(Q)), random.standard_normal(len(Q))
-    load = LoadCase(p * 0, -p, p)
+    load = DualLoadCase(p * 0, -p, p)
     lam, gap = own.vectors(own.solved(load, TOLERANCE))
     start = WarmStart(load, lam * (1 + scale * random.standard_normal(len(lam))), gap)
     for now in (p, 1.001 * p):
-        answer = own.answer(own.solved(LoadCase(p * 0, -now, now), TOLERANCE, start), TOLERANCE)
+        answer = own.answer(own.solved(DualLoadCase(p * 0, -now, now), TOLERANCE, start), TOLERANCE)
         assert answer.status == "solved"
         assert residual(Q, now, answer.lam) <= TOLERANCE
 
@@ -311,7 +310,7 @@ def test_unsettled_forces_are_cut_at_zero_and_judged_as_such(monkeypatch: pytest
     Q, p = decaying(), np.random.default_rng(3).standard_normal(LINES * ACROSS)
     monkeypatch.setattr(newton_sweeps, "MAX_SWEEPS", 2)
     own = Sweeps(dual_alone(Q))
-    case = own.solved(LoadCase(p * 0, -p, p), TOLERANCE)
+    case = own.solved(DualLoadCase(p * 0, -p, p), TOLERANCE)
     assert not case.settled
     answer = own.answer(case, TOLERANCE)
     assert (answer.status, answer.iterations) == ("iteration_limit", 2)

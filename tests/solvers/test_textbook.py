@@ -57,7 +57,7 @@ def test_gauss_seidel_converges_for_any_relaxation_below_two(relaxation: float) 
 def test_gauss_seidel_gives_up_rather_than_be_wrong(rung: str) -> None:
     made = read_scene(f"hard/conditioning/{rung}").made
     prepared = Prepared(made.assembly)
-    load = LoadCase(made.load.f, made.load.g, prepared.dual_load(made.load))
+    (load,) = prepared.with_p([made.load])
     answer = solved("projected-gauss-seidel", prepared, load)
     if answer.status == "solved":
         off = abs(prepared.recover(answer.lam, load) - made.x).max()
