@@ -7,7 +7,8 @@ import numpy as np
 import scipy.io
 import scipy.linalg as sla
 
-FOLDERS = ("mtx", "abaqus")
+from problems.formats import FORMATS
+
 PATHS = {"npz": "p.npz", "op4": "p.op4", "dmig": "p.pch", "mtx": "m", "abaqus": "a"}
 
 RNG = np.random.default_rng(11)
@@ -22,7 +23,8 @@ DATA: dict[str, Any] = {
 
 
 def files_of(form: str, path: Path) -> list[str]:
-    return [str(path / f"{name}.mtx") for name in "KAfg"] if form in FOLDERS else [str(path)]
+    folder = FORMATS[form].is_folder
+    return [str(path / f"{name}.mtx") for name in "KAfg"] if folder else [str(path)]
 
 
 def write_mtx(folder: Path, **changes: Any) -> Path:

@@ -65,7 +65,7 @@ def write_part(
     else:
         n = K.shape[0]
         data = {"K": sp.csr_array(K), "A": sp.csc_array(np.eye(n, 1)), "f": np.zeros(n), "g": np.zeros(1)}
-        written = folder / f"{name}{formats.FORMATS[format].suffix}"
+        written = folder / name if formats.FORMATS[format].is_folder else path
         formats.FORMATS[format].write(written, data)
         path = written / "K.mtx" if written.is_dir() else written
     write_nodes(folder / f"{name}.csv", xyz, normals, **more)

@@ -14,6 +14,7 @@ from problems.forms.assembly import Matrix
 from problems.input.scan_points import crowded
 from problems.input.tables import read_columns
 from problems.model.effect import SpringEffect
+from problems.model.interface import on_junction
 from problems.model.positions import MOST
 from problems.model.scene import JointScene, Scene
 
@@ -70,7 +71,7 @@ class Movable:
         """Of points off the parts, there twice, or where a fastener is installed."""
         joint = self.bare.joint
         on = joint.covers(self.fastener.parts(joint), points)
-        found = [Fault(source, "x, y", points[k].tolist(), joint.region) for k in np.flatnonzero(~on)]
+        found = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in np.flatnonzero(~on)]
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
         for installed in self.bare.effects_of(SpringEffect):
             found += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]

@@ -84,7 +84,7 @@ def export(
 
 def _refuse_suffix(out: Path, kind: formats.Format, program: bool) -> None:
     """Raise InputError for a folder named like a file, or a file named like one of another kind."""
-    folder = not kind.suffix or (program and out.suffix != ".npz")
+    folder = kind.is_folder or (program and out.suffix != ".npz")
     if folder and out.suffix[1:2].isalpha():
         allowed = "no suffix: a folder is written" + (", or one file PATH.npz" if program else "")
         raise InputError.one("--out", "path", str(out), allowed)

@@ -33,7 +33,7 @@ from harness.verification.reference import UNPROVEN
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Vector
-from problems.model.effect import Effect, ForceEffect, GapEffect, SpringEffect
+from problems.model.effect import Effect, GapEffect, SpringEffect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.positions import FORCES
@@ -246,7 +246,7 @@ def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
     own = [(pair, joint.span(pair)) for pair in joint.pairs]
     pairs = [{"pair": pair, "start": span.start, "stop": span.stop} for pair, span in own]
     marks: dict[str, list[list[float]]] = {}
-    for effect in scene.effects_of(ForceEffect):
+    for effect in scene.effects:
         if len(points := effect.marks(joint)):
             marks.setdefault(effect.kind, []).extend(points.tolist())
     return {"parts": parts, "pairs": pairs, "marks": marks}

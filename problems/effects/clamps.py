@@ -7,8 +7,8 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import Positive
-from problems.model.effect import Pair, pressing_forces, sides
-from problems.model.interface import AnyJoint
+from problems.model.interface import AnyJoint, Pair
+from problems.model.junction_terms import pressing_forces, sides
 from problems.model.positions import Positions
 
 _AXIS = (np.arange(16) - 7.5) / 8

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Positive
-from problems.model.effect import pressing_forces
 from problems.model.interface import AnyJoint
+from problems.model.junction_terms import pressing_forces
 from problems.model.positions import Positions
 
 

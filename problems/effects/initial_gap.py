@@ -8,9 +8,10 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import Finite, Positive, Seed
-from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
+from problems.model.effect import ContactEffect, Effect, GapEffect
 from problems.model.interface import AnyJoint, Pair
 from problems.model.joint import Faults, Table
+from problems.model.junction_terms import at_contacts
 
 #: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `square_root`.
 SHIFT = 1e-10

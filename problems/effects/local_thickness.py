@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import Effect, StiffnessEffect
-from problems.model.interface import AnyJoint
+from problems.model.interface import AnyJoint, on_part
 from problems.model.joint import Faults
 from problems.model.plate import Plate, Range
 
@@ -28,9 +28,9 @@ class LocalThickness(StiffnessEffect):
         return self.thickness, self.x, self.y
 
     def misfits(self, plate: Plate) -> Faults:
-        for key, (start, stop), grid in (("x", self.x, plate.x), ("y", self.y, plate.y)):
-            if not grid[0] <= start < stop <= grid[-1]:
-                yield key, [start, stop], f"start < stop on the part, {grid[0]:g} … {grid[-1]:g} mm"
+        (x, x_end), (y, y_end) = self.x, self.y
+        if not (x < x_end and y < y_end and plate.covers(x, y) and plate.covers(x_end, y_end)):
+            yield "x, y", [list(self.x), list(self.y)], f"start < stop, {on_part(plate)}"
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)

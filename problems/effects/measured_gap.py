@@ -12,9 +12,10 @@ from pydantic import Field
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import Finite
 from problems.input.scan_points import crowded, too_small, unlike
-from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
+from problems.model.effect import ContactEffect, Effect, GapEffect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults
+from problems.model.junction_terms import at_contacts
 from problems.model.surface import Triangles
 
 

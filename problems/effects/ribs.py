@@ -7,6 +7,7 @@ from pydantic import Field
 
 from problems.input.bounded_types import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
+from problems.model.interface import on_part
 from problems.model.joint import Faults
 from problems.model.plate import Plate
 
@@ -19,10 +20,9 @@ class Ribs(StiffnessEffect):
     J: Annotated[NotNegative, "mm⁴"] = 0.0
 
     def misfits(self, plate: Plate) -> Faults:
-        south, north = plate.y[[0, -1]]
-        for k, line in enumerate(self.lines):
-            if not south <= line <= north:
-                yield f"lines[{k}]", line, f"on the part, {south:g} … {north:g} mm"
+        for k, y in enumerate(self.lines):
+            if not plate.covers(0.0, y):
+                yield f"lines[{k}]", y, on_part(plate)
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J

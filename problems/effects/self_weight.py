@@ -6,7 +6,8 @@ import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Finite, Positive
-from problems.model.part import PartLoadEffect, PartModel
+from problems.model.effect import PartLoadEffect
+from problems.model.part import PartModel
 
 KG_PER_M3_TIMES_M_PER_S2 = 1e-9  # N/mm³
 

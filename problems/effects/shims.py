@@ -7,9 +7,10 @@ import numpy as np
 
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded_types import Finite, Positive
-from problems.model.effect import ContactEffect, Effect, GapEffect, Pair, at_contacts
-from problems.model.interface import AnyJoint
+from problems.model.effect import ContactEffect, Effect, GapEffect
+from problems.model.interface import AnyJoint, Pair
 from problems.model.joint import Faults
+from problems.model.junction_terms import at_contacts
 
 
 class Shims(ContactEffect, GapEffect):
@@ -25,8 +26,10 @@ class Shims(ContactEffect, GapEffect):
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         pairs = [pair for pair in self.pairs(joint) if pair in joint.pairs]
-        if pairs and not any(self._covered(joint.places(pair)).any() for pair in pairs):
-            allowed = f"ranges that contain a node; {joint.spacing}"
+        places = np.concatenate([np.zeros((0, 2)), *map(joint.places, pairs)])
+        if len(places) and not self._covered(places).any():
+            x, y = places[((places - np.mean([self.x, self.y], axis=1)) ** 2).sum(axis=1).argmin()]
+            allowed = f"ranges that contain a node; the nearest is at {x:g}, {y:g} mm"
             yield "x, y", [list(self.x), list(self.y)], allowed
 
     def _covered(self, nodes: Matrix) -> Mask:

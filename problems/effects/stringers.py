@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from problems.input.bounded_types import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
+from problems.model.interface import on_part
 from problems.model.joint import Faults
 from problems.model.plate import Plate
 
@@ -28,8 +29,7 @@ class Stringers(StiffnessEffect):
     def misfits(self, plate: Plate) -> Faults:
         south, north = plate.y[[0, -1]]
         if max(self.start, south) >= min(self.stop, north):
-            allowed = f"a length on the part, {south:g} … {north:g} mm"
-            yield "start, stop", [self.start, self.stop], allowed
+            yield "start, stop", [self.start, self.stop], f"a length {on_part(plate)}"
         if plate.x[-1] > MOST * self.pitch:
             yield "pitch", self.pitch, f"at least {plate.x[-1] / MOST:g} mm: {MOST} stringers"
 

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import StiffnessEffect
+from problems.model.interface import on_part
 from problems.model.joint import Faults
 from problems.model.plate import Plate
 
@@ -25,10 +26,9 @@ class Supports(StiffnessEffect):
         return self.points
 
     def misfits(self, plate: Plate) -> Faults:
-        length, (south, north) = plate.x[-1], plate.y[[0, -1]]
-        for k, (x, y) in enumerate(self.points):
-            if not (0 <= x <= length and south <= y <= north):
-                yield f"points[{k}]", [x, y], f"on the part, 0 … {length:g} × {south:g} … {north:g} mm"
+        for k, point in enumerate(self.points):
+            if not plate.covers(*point):
+                yield f"points[{k}]", list(point), on_part(plate)
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         e = sp.vstack([plate.evaluate(x, y) for x, y in self.points])

@@ -7,7 +7,8 @@ import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Finite, Positive
-from problems.model.part import PartLoadEffect, PartModel
+from problems.model.effect import PartLoadEffect
+from problems.model.part import PartModel
 
 
 class ThermalBending(PartLoadEffect):

@@ -27,12 +27,16 @@ DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 
 @dataclass(frozen=True)
 class Format:
-    """description : of what is written, a file or a folder of one per matrix. suffixes : of files to read.
+    """A format of files, and the functions that read and write it.
 
-    read : the chosen matrices of a file by their names in it, a single one by the file's stem; and the node
-    and degree of freedom of each row (n, 2), None if the file does not say so. accepts : whether a file is of
-    this format, where another has its suffix. omits_zeros : f and g that are zero everywhere. words : for a
-    node and a degree of freedom.
+    description : the help text of `export --format`.
+    suffixes : the suffixes of files to read; the first is that of the file written.
+    write : writes a file, or a folder with a file per matrix if `is_folder`.
+    read : returns the chosen matrices of a file by their names in it, a single one by the file's stem, and
+        the labels of the rows of each: (n, 2) node and degree of freedom, None if the file has no labels.
+    accepts : tells two formats of one suffix apart by the file's content.
+    omits_zeros : whether f and g are not written if they are zero everywhere.
+    words : the format's words for a node and a degree of freedom.
     """
 
     description: str
@@ -40,13 +44,9 @@ class Format:
     write: Callable[[Path, Data], None]
     read: Callable[[Path, Choose], Read]
     accepts: Callable[[Path], bool] = lambda path: True
+    is_folder: bool = False
     omits_zeros: bool = False
     words: tuple[str, str] = ("node", "dof")
-
-    @property
-    def suffix(self) -> str:
-        """Of what it writes; "" if that is a folder."""
-        return "" if self.description.startswith("a folder") else self.suffixes[0]
 
 
 def _write_npz(path: Path, data: Data) -> None:
@@ -68,6 +68,7 @@ FORMATS = {
         matrix_text.write_abaqus,
         matrix_text.read_abaqus,
         lambda path: not matrix_text.is_matrix_market(path),
+        is_folder=True,
     ),
     "dmig": Format(
         "a file .pch (Nastran DMIG), 10 digits",
@@ -83,6 +84,7 @@ FORMATS = {
         matrix_text.write_matrix_market,
         matrix_text.read_matrix_market,
         matrix_text.is_matrix_market,
+        is_folder=True,
     ),
     "npz": Format("a file .npz, bit for bit", (".npz",), _write_npz, _read_npz),
     "op4": Format(

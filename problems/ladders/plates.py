@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from problems.model.effect import effect_class
+from problems.model.effect_tables import effect_class
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
 

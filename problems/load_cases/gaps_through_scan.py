@@ -23,7 +23,7 @@ from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.input.scan_points import crowded, too_small, unlike
 from problems.input.tables import read_columns
-from problems.model.interface import AnyJoint
+from problems.model.interface import AnyJoint, on_junction
 
 NOISE = 1e-3  # ν
 MOST = 5000  # points of a scan: WCWᵀ is dense
@@ -39,7 +39,7 @@ def read_scan(path: Path, joint: AnyJoint) -> tuple[Matrix, list[str]]:
         raise InputError.one(path, "points", len(read.rows), f"at most {MOST}: thin the scan out")
     points, lines = np.array(read.rows).reshape(-1, 3), read.lines
     outside = [
-        Fault(str(path), f"line {lines[k]}", points[k, :2].tolist(), joint.region)
+        Fault(str(path), f"line {lines[k]}", points[k, :2].tolist(), on_junction(joint))
         for k in np.flatnonzero(~joint.covers(joint.names, points[:, :2]))
     ]
     twice = [

@@ -14,8 +14,8 @@ from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix
 from problems.input.bounded_types import validation_faults
-from problems.model.effect import at_contacts
 from problems.model.interface import AnyJoint
+from problems.model.junction_terms import at_contacts
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 

@@ -1,25 +1,15 @@
-"""What an effect is: its parameters and the term that it adds.
+"""The base classes of effects. An effect is a table of parameters and the term that it adds to the problem.
 
-An effect `kind = "some_effect"` in a scene is the class SomeEffect of problems/effects/some_effect.py.
-Its module is imported only when a scene names it.
-
-    StiffnessEffect   to the stiffness of one part, before condensation
-    ForceEffect       forces on the junction nodes
-    Positions         (positions.py) forces at points of the junction
-    PartLoadEffect    (part.py) a load anywhere on one part, condensed onto its junction nodes
-    GapEffect         to the initial gap; it may add the contact that it acts on
-    SpringEffect         springs between the junction nodes of two parts, and their installation forces
-
-One that acts on a part is a PartEffect as well, one that acts on contacts a ContactEffect.
+An effect `kind = "some_effect"` in a scene is the class SomeEffect of problems/effects/some_effect.py. Its
+module is imported only when a scene names it. A table in docs/effects.md says which base class to take. An
+effect that acts on contacts and adds to the gap derives from two: `class Shims(ContactEffect, GapEffect)`.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,59 +18,83 @@ from pydantic import Field, PrivateAttr
 from problems.forms.assembly import Matrix, Vector
 
 from .interface import AnyJoint, Pair
-from .joint import TOOL, Faults, Table
+from .joint import Faults, Table
 from .plate import Plate, Range
+
+if TYPE_CHECKING:
+    from .part import PartModel
 
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
 
-#: Effects that a user may look for, and the assumption of the model that excludes each.
-EXCLUDED = {
-    "friction": "assumption 4: friction between the parts is neglected",
-    "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
-    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
-    "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
-    "large_rotation": "assumption 5: linear elasticity, so displacements and rotations are small",
-    "plasticity": "assumption 5: linear elasticity",
-    "creep": "assumption 5: linear elasticity",
-    "dynamics": "the answer is the minimum of a static energy, without inertia or time",
-    "vibration": "the answer is the minimum of a static energy, without inertia or time",
-    "impact": "the answer is the minimum of a static energy, without inertia or time",
-}
-
 
 class Effect(Table):
-    """Parameters of an effect, each with its unit, as in Annotated[Positive, "mm"]."""
+    """A [[effect]] table of a scene: its parameters, checked, each with its unit.
 
-    #: Of the CSV that a table may name as `file` in place of `points`; none if there is no such file.
+    Parameters are fields of the class; the unit is a string in `Annotated`, which messages repeat.
+
+    Examples
+    --------
+    >>> from problems.effects.self_weight import SelfWeight
+    >>> SelfWeight(kind="self_weight", part="skin").density  # Annotated[Positive, "kg/m³"] = 2700.0
+    2700.0
+    """
+
+    #: Columns of the CSV that a table may name as `file` in place of `points`; empty if it may not.
     columns: ClassVar[tuple[str, ...]] = ()
     kind: str
-    #: Of each point, the line of its file; empty if they are from a list.
+    #: The line of each point in its file; empty if the points are from a list.
     _lines: tuple[str, ...] = PrivateAttr(())
 
     def point_name(self, k: int) -> str:
+        """The name of point k in messages: its line in the file, or points[k]."""
         return self._lines[k] if self._lines else f"points[{k}]"
 
     @property
     def contacts(self) -> tuple[Pair, ...]:
-        """The contacts that this effect adds."""
+        """The contacts (a, b) that this effect adds to the joint."""
         return ()
 
     def parts(self, joint: AnyJoint) -> tuple[str, ...]:
-        """The parts on which it acts."""
+        """The names of the parts on which the effect acts."""
         return joint.names
 
+    def marks(self, joint: AnyJoint) -> Matrix:
+        """The points that pictures of the junction mark for this effect.
+
+        Returns
+        -------
+        (k, 2) ndarray
+            x and y in mm.
+        """
+        return np.zeros((0, 2))
+
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
-        """Of parameters that do not fit the joint, or contradict the other effects of the scene."""
+        """Yield the parameters that do not fit the joint, or contradict other effects of the scene.
+
+        The scene is then refused with all of them in one message; nothing is raised here.
+
+        Parameters
+        ----------
+        joint : AnyJoint
+            The joint with the contacts that effects add.
+        others : sequence of Effect
+            The other effects of the scene.
+
+        Yields
+        ------
+        (str, object, str)
+            The key of the parameter, its value, and what is allowed.
+        """
         yield from ()
 
     def unusual(self, joint: AnyJoint) -> Faults:
-        """What may be, but is rarely meant: key, value, what is usual."""
+        """Yield the parameters that are possible but rarely meant: key, value, what is usual."""
         yield from ()
 
 
 class PartEffect(Effect):
-    """Acts on one part."""
+    """An effect on one part; the table names it as `part`."""
 
     part: str
 
@@ -93,12 +107,12 @@ class PartEffect(Effect):
 
 
 class ContactEffect(Effect):
-    """Acts on the contact `between`, by default on all: each gets the gap, the fastener goes through each."""
+    """An effect on the contact `between`, by default on each contact of the joint."""
 
     between: Between = None
 
     def pairs(self, joint: AnyJoint) -> tuple[Pair, ...]:
-        """The contacts that it acts on."""
+        """The contacts (a, b) on which the effect acts."""
         return joint.pairs if self.between is None else (self.between,)
 
     def parts(self, joint: AnyJoint) -> tuple[str, ...]:
@@ -114,12 +128,40 @@ class ContactEffect(Effect):
             yield "between", list(self.between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
 
 
-class StiffnessEffect(PartEffect):
-    """Adds a term to the stiffness of one part, before condensation."""
+class ElementEffect(PartEffect):
+    """An effect on the finite elements of a plate; a superelement has none."""
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
+        if self.part in joint.names:
+            if (plate := joint.plate_of(self.part)) is not None:
+                yield from self.misfits(plate)
+            else:
+                allowed = f"a superelement has no elements for {self.kind} to act on: put it into its K"
+                yield "part", self.part, allowed
+
+    def misfits(self, plate: Plate) -> Faults:
+        """Yield the parameters that do not fit the part, as `faults` does.
+
+        Parameters
+        ----------
+        plate : Plate
+            The elements of the whole part, in the junction and beyond it.
+
+        Yields
+        ------
+        (str, object, str)
+            The key of the parameter, its value, and what is allowed, as `on_part(plate)`.
+        """
+        yield from ()
+
+
+class StiffnessEffect(ElementEffect):
+    """A term of the stiffness of one part, before condensation."""
 
     @property
     def held_points(self) -> tuple[tuple[float, float], ...]:
-        """The points at which the effect supports the part."""
+        """The points (x, y), mm, at which the effect supports the part."""
         return ()
 
     @property
@@ -129,37 +171,85 @@ class StiffnessEffect(PartEffect):
 
     @abstractmethod
     def stiffness(self, plate: Plate) -> sp.csr_array:
-        """(plate.size, plate.size) term in N/mm, coupling only neighbouring grid lines y = const."""
+        """The term, added to the stiffness of the part.
 
-    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
-        yield from super().faults(joint, others)
-        if self.part in joint.names:
-            plate = joint.plate_of(self.part)
-            yield from self.misfits(plate) if plate is not None else no_elements(self, joint)
+        Parameters
+        ----------
+        plate : Plate
+            The elements of the part.
 
-    def misfits(self, plate: Plate) -> Faults:
-        """Of parameters that do not fit the part."""
-        yield from ()
+        Returns
+        -------
+        (plate.size, plate.size) csr_array
+            Symmetric but for rounding, N/mm for deflections; coupling only neighbouring grid lines y = const.
+        """
+
+
+class PartLoadEffect(ElementEffect):
+    """A load on one part, in the junction or beyond it; it is condensed onto the junction."""
+
+    @abstractmethod
+    def load(self, model: PartModel) -> Vector:
+        """The load on all unknowns of the part.
+
+        Parameters
+        ----------
+        model : PartModel
+            The elements of the part (`model.plate`) and the StiffnessEffects that act on it.
+
+        Returns
+        -------
+        (plate.size,) ndarray
+            Generalised forces: N on a deflection, N·mm on a slope, N·mm² on a twist.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from problems.effects.self_weight import SelfWeight
+        >>> from problems.model.part import PartModel
+        >>> plate = Plate(np.linspace(0, 400, 5), np.linspace(0, 100, 3), 2.0, 70e3, 0.3)
+        >>> f = SelfWeight(kind="self_weight", part="skin").load(PartModel(plate, (), range(3)))
+        >>> f.shape, round(sum(f[plate.deflection_dofs(line)].sum() for line in range(3)), 4)  # N
+        ((60,), 2.1182)
+        """
 
 
 class ForceEffect(Effect):
-    """Adds nodal forces in the junction."""
+    """Forces in the junction."""
 
     @abstractmethod
     def force(self, joint: AnyJoint) -> Vector:
-        """(n,) forces in N, positive from the first part of a pair towards the second."""
+        """The forces, added to f.
 
-    def marks(self, joint: AnyJoint) -> Matrix:
-        """(k, 2) points to mark in figures of the junction, mm."""
-        return np.zeros((0, 2))
+        Parameters
+        ----------
+        joint : AnyJoint
+            Its `deflection` distributes a force at a point over the unknowns around it.
+
+        Returns
+        -------
+        (n,) ndarray
+            N, positive from the first part of a contact towards the second.
+        """
 
 
 class GapEffect(Effect):
-    """Adds to the initial gap."""
+    """A term of the initial gap."""
 
     @abstractmethod
     def gap(self, joint: AnyJoint) -> Vector:
-        """(m,) gap in mm."""
+        """The gap, added to g.
+
+        Parameters
+        ----------
+        joint : AnyJoint
+            Its `places` are the points of the contacts.
+
+        Returns
+        -------
+        (m,) ndarray
+            mm; negative where the parts overlap before they are loaded.
+        """
 
     def beyond(self, joint: AnyJoint) -> Vector:
         """(m,) how far each contact is from the nearest measured point if it is beyond these, mm; else 0."""
@@ -167,78 +257,29 @@ class GapEffect(Effect):
 
 
 class SpringEffect(ForceEffect):
-    """Adds springs between parts at points of the junction: K += T diag(k) Tᵀ, after condensation."""
+    """Springs between two parts at points of the junction: K += T diag(k) Tᵀ, after condensation.
+
+    Its `force` is that of the springs where the parts have not moved, T k · approach.
+    """
 
     @abstractmethod
     def tied(self, joint: AnyJoint) -> list[Pair]:
-        """The pairs that its springs join, each at all of its marks: the order of the columns of T."""
+        """The pairs of parts that the springs join, each at all marks: the order of the columns of T."""
 
     @abstractmethod
     def springs(self, joint: AnyJoint) -> tuple[sp.csc_array, Vector]:
-        """T (n, r), one column per spring with its direction, and k (r,) in N/mm."""
+        """The directions and the stiffness of the springs.
 
-
-def at_contacts(values: Callable[[Pair], Vector | float], pairs: Sequence[Pair], joint: AnyJoint) -> Vector:
-    """g (m,) with these values, (c,), at the contacts of each pair, and 0 at the others."""
-    g = np.zeros(joint.size[1])
-    for pair in pairs:
-        g[joint.span(pair)] = values(pair)
-    return g
-
-
-def pressing_forces(
-    acting: Callable[[Pair], Iterable[tuple[Matrix, float]]], pairs: Sequence[Pair], joint: AnyJoint
-) -> Vector:
-    """f (n,) of forces that press the two parts of each pair together along the normal of the first.
-
-    acting : gives points (k, 2), mm, and the force at each of them, N.
-    """
-    f = np.zeros(joint.size[0])
-    for pair in pairs:
-        presses = list(acting(pair))
-        for part, sign in sides(pair):
-            nodal = np.zeros(f[joint.unknowns(part)].shape)
-            for points, newton in presses:
-                nodal += newton * joint.deflection(part, points, pair[0]).sum(axis=0)
-            f[joint.unknowns(part)] += sign * nodal
-    return f
-
-
-def junction_load(effects: Iterable[Effect], joint: AnyJoint) -> tuple[Vector, Vector]:
-    """f (n,) N, the forces in the junction, and g (m,) mm, the gaps, of some effects."""
-    f, g = (np.zeros(size) for size in joint.size)
-    for effect in effects:
-        if isinstance(effect, ForceEffect):
-            f += effect.force(joint)
-        elif isinstance(effect, GapEffect):
-            g += effect.gap(joint)
-    return f, g
-
-
-def sides(pair: Pair) -> list[tuple[str, float]]:
-    """The parts of a pair, without a tool, and their signs in a column of A."""
-    return [(part, sign) for part, sign in zip(pair, (1.0, -1.0), strict=True) if part != TOOL]
+        Returns
+        -------
+        T : (n, r) csc_array
+            A column per spring: its elongation is Tᵀx.
+        k : (r,) ndarray
+            N/mm.
+        """
 
 
 def unknown_part(part: str, joint: AnyJoint) -> Faults:
+    """Yield the fault of a name that no part of the joint has."""
     if part not in joint.names:
         yield "part", part, f"one of {list(joint.names)}"
-
-
-def no_elements(effect: PartEffect, joint: AnyJoint) -> Faults:
-    """Of an effect that acts on the elements of its part."""
-    if effect.part in joint.names and joint.plate_of(effect.part) is None:
-        kind = f"a superelement has no elements for {effect.kind} to act on: put it into its K"
-        yield "part", effect.part, kind
-
-
-def effect_kinds() -> list[str]:
-    """All kinds: the files of problems/effects."""
-    package = importlib.import_module("problems.effects")
-    return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
-
-
-def effect_class(kind: str) -> type[Effect]:
-    """The class of a kind, imported on demand. Raises ModuleNotFoundError if there is no such kind."""
-    module = importlib.import_module(f"problems.effects.{kind}")
-    return getattr(module, kind.title().replace("_", ""))

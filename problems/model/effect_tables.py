@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,11 +17,24 @@ from problems.errors import Fault
 from problems.input.bounded_types import unknown, validation_faults
 from problems.input.tables import Rows, read_columns
 
-from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
+from .effect import Effect, unknown_part
 from .interface import AnyJoint
 from .joint import Faults
 
 FILE_KEYS = ("file", "columns", "skip_lines", "missing")
+#: Effects that a user may look for, and the assumption of the model that excludes each.
+EXCLUDED = {
+    "friction": "assumption 4: friction between the parts is neglected",
+    "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
+    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
+    "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
+    "large_rotation": "assumption 5: linear elasticity, so displacements and rotations are small",
+    "plasticity": "assumption 5: linear elasticity",
+    "creep": "assumption 5: linear elasticity",
+    "dynamics": "the answer is the minimum of a static energy, without inertia or time",
+    "vibration": "the answer is the minimum of a static energy, without inertia or time",
+    "impact": "the answer is the minimum of a static energy, without inertia or time",
+}
 
 
 @dataclass
@@ -113,3 +128,15 @@ class EffectTable:
     def _is_consequence(self, key: str) -> bool:
         """Whether a fault of all points, or of the whole table, may result from bad rows of a file."""
         return bool(self.rows and self.rows.faults and key in ("", "points"))
+
+
+def effect_kinds() -> list[str]:
+    """All kinds: the names of the files of problems/effects."""
+    package = importlib.import_module("problems.effects")
+    return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+
+
+def effect_class(kind: str) -> type[Effect]:
+    """The class of a kind, imported on demand. Raises ModuleNotFoundError if there is no such kind."""
+    module = importlib.import_module(f"problems.effects.{kind}")
+    return getattr(module, kind.title().replace("_", ""))

@@ -18,8 +18,7 @@ Pair = tuple[str, str]
 class AnyJoint(Protocol):
     """Parts whose displacements x (n,) may touch at m contacts: x_a − x_b ≤ g, along the normal from a to b.
 
-    Points (k, 2) are in the plane of the junction, mm. region, spacing : of points and nodes, in words.
-    thinnest : of its plates, mm; infinite if that is not known. shortest : the least correlation length, mm.
+    Points (k, 2) are in the plane of the junction, mm.
     """
 
     @property
@@ -39,16 +38,12 @@ class AnyJoint(Protocol):
         """(2, 2) the lower and the upper corner of the junction."""
 
     @property
-    def region(self) -> str: ...
+    def thinnest(self) -> float:
+        """The least thickness of its plates, mm; infinite if that is not known."""
 
     @property
-    def spacing(self) -> str: ...
-
-    @property
-    def thinnest(self) -> float: ...
-
-    @property
-    def shortest(self) -> float: ...
+    def shortest(self) -> float:
+        """The least correlation length of a random field, mm."""
 
     @property
     def content(self) -> Any:
@@ -107,6 +102,23 @@ class AnyJoint(Protocol):
 
     def unusual(self) -> Faults:
         """What may be, but is rarely meant: key, value, what is usual."""
+
+
+def extent(bounds: Matrix) -> str:
+    """The ranges of x and y between two corners (2, 2), for messages."""
+    (west, south), (east, north) = bounds
+    return f"{west:g} … {east:g} × {south:g} … {north:g} mm"
+
+
+def on_part(plate: Plate) -> str:
+    """What is allowed for a point that is off a part, for messages."""
+    return f"on the part, {extent(plate.bounds)}"
+
+
+def on_junction(joint: AnyJoint) -> str:
+    """What is allowed for a point that is off the junction, for messages."""
+    bays = "" if joint.plate_of(joint.names[0]) else ", not in a bay or a hole of a part"
+    return f"on the junction, {extent(joint.bounds)}{bays}"
 
 
 def across(joint: AnyJoint, rows: Mapping[str, sp.sparray], count: int) -> sp.csr_array:

@@ -130,15 +130,6 @@ class Joint(Table):
         return np.array([[0.0, 0.0], [self.junction.length, self.junction.width]])
 
     @property
-    def region(self) -> str:
-        return f"on the junction, 0 … {self.junction.length:g} × 0 … {self.junction.width:g} mm"
-
-    @property
-    def spacing(self) -> str:
-        hx, hy = self.x[1] - self.x[0], self.y[1] - self.y[0]
-        return f"nodes are spaced {hx:g} × {hy:g} mm from (0, 0)"
-
-    @property
     def thinnest(self) -> float:
         return min(part.thickness for part in self.part)
 

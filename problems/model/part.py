@@ -12,8 +12,7 @@ as wide, and what costs its cube an eighth.
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -21,11 +20,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Indices, Vector
+from problems.forms.assembly import Indices
 
-from .effect import Effect, PartEffect, StiffnessEffect, no_elements
-from .interface import AnyJoint
-from .joint import Faults, Joint, Part
+from .effect import StiffnessEffect
+from .joint import Joint, Part
 from .plate import WHOLE, LineLoads, Plate, line_loads
 
 
@@ -95,18 +93,6 @@ class PartModel:
             areas += [(1.0, thickness, x, y), (-1.0, plate.thickness, x, y)]
         for sign, thickness, x, y in areas:
             yield sign, thickness, line_loads(plate.x, *x), line_loads(plate.y, *y)
-
-
-class PartLoadEffect(PartEffect):
-    """Adds a load on one part, in the junction or beyond it."""
-
-    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
-        yield from super().faults(joint, others)
-        yield from no_elements(self, joint)
-
-    @abstractmethod
-    def load(self, model: PartModel) -> Vector:
-        """(plate.size,) generalised force on each degree of freedom: N, N·mm, N·mm²."""
 
 
 GROWTH = 1.2  # of the distance between lines, away from the junction

@@ -42,6 +42,15 @@ class Plate:
         return 4 * len(self.x) * len(self.y)
 
     @property
+    def bounds(self) -> Matrix:
+        """(2, 2) the lower and the upper corner, mm."""
+        return np.array([[self.x[0], self.y[0]], [self.x[-1], self.y[-1]]])
+
+    def covers(self, x: float, y: float) -> bool:
+        """Whether a point is on the part, its border included."""
+        return bool(self.x[0] <= x <= self.x[-1] and self.y[0] <= y <= self.y[-1])
+
+    @property
     def rigidity(self) -> float:
         """D = E t³ / (12 (1 − ν²)), N·mm."""
         return self.young * self.thickness**3 / (12 * (1 - self.poisson**2))

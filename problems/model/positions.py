@@ -13,7 +13,7 @@ from problems.input.bounded_types import Finite, NotNegative
 from problems.input.scan_points import crowded
 
 from .effect import ContactEffect, Effect, ForceEffect, SpringEffect
-from .interface import AnyJoint
+from .interface import AnyJoint, on_junction
 from .joint import Faults, Table
 
 FORCES = ("preload", "clamping_force")  # keys of the effects that press at points
@@ -85,7 +85,7 @@ class Positions(ContactEffect, ForceEffect):
                 return
         marks = self.marks(joint)
         for k in np.flatnonzero(~joint.covers(self.parts(joint), marks)):
-            yield f"points[{k}]" if self.points else "pattern", marks[k].tolist(), joint.region
+            yield f"points[{k}]" if self.points else "pattern", marks[k].tolist(), on_junction(joint)
         for first, twin in crowded(marks) if self.in_holes and self.points else ():
             allowed = f"separate places: {self.point_name(first)} is there, too"
             yield f"points[{twin}]", marks[twin].tolist(), allowed

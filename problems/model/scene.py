@@ -12,7 +12,7 @@ import numpy as np
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.storage import digest
 
-from .effect import Effect, ForceEffect, StiffnessEffect
+from .effect import Effect, StiffnessEffect
 from .interface import AnyJoint
 from .joint import Table
 
@@ -118,8 +118,7 @@ class JointScene(Scene):
         ]
 
     def marks(self) -> Matrix:
-        own = [effect.marks(self.joint) for effect in self.effects_of(ForceEffect)]
-        return np.concatenate([super().marks(), *own])
+        return np.concatenate([super().marks(), *(effect.marks(self.joint) for effect in self.effects)])
 
 
 @dataclass(frozen=True)

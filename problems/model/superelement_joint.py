@@ -211,16 +211,6 @@ class SuperelementJoint:
         return np.array([every.min(axis=0), every.max(axis=0)])
 
     @property
-    def region(self) -> str:
-        (west, south), (east, north) = self.bounds
-        return f"on the contact surface of each part, within {west:g} … {east:g} × {south:g} … {north:g} mm"
-
-    @property
-    def spacing(self) -> str:
-        (west, south), (east, north) = self.bounds
-        return f"they are within {west:g} … {east:g} × {south:g} … {north:g} mm"
-
-    @property
     def thinnest(self) -> float:
         return np.inf
 

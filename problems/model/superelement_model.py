@@ -29,7 +29,8 @@ from problems.reporter import SILENT, Reporter
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
 
-from .effect import Effect, junction_load
+from .effect import Effect
+from .junction_terms import junction_load
 from .scene import JointScene
 from .springs import Springs
 from .superelement_joint import SuperelementJoint

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import harness
-from matrix_files import FOLDERS, PATHS, files_of
+from matrix_files import PATHS, files_of
 from rich.console import Console
 
 from harness.scene.export import export, import_
 from harness.scene.solve import solve
+from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.scene_files import read_scene
@@ -93,7 +94,7 @@ def test_there_and_back(form: str, path: Path) -> None:
     """And the matrices, solved by themselves, give the same displacements."""
     file, back = path.parent / PATHS[form], path.parent / "back.npz"
     export(str(path), form, file, QUIET)
-    assert file.is_dir() == (form in FOLDERS)
+    assert file.is_dir() == formats.FORMATS[form].is_folder
     import_(files_of(form, file), back, QUIET)
     own, scene = read_scene(str(back)), read_scene(str(path))
     wanted, found = prepared(scene), prepared(own)

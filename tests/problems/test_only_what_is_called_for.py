@@ -10,7 +10,7 @@ from effect_tables import TABLES, scene_of
 from small_joints import make_joint, make_scene, untied
 
 from problems.build import prepared
-from problems.model.effect import effect_class, effect_kinds
+from problems.model.effect_tables import effect_class, effect_kinds
 from problems.model.scene import plain
 from problems.scene_files import read_scene, scene_names
 

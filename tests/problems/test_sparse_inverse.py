@@ -17,7 +17,8 @@ from sparse_matrices import band_matrix, graph_matrix, renumbered
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix
 from problems.forms.prepared import Prepared
-from problems.model.effect import Effect, effect_class
+from problems.model.effect import Effect
+from problems.model.effect_tables import effect_class
 from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene, scene_names

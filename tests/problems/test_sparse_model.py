@@ -25,7 +25,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Matrix
 from problems.model.condensation import NotPositiveDefinite, condense
-from problems.model.effect import effect_class
+from problems.model.effect_tables import effect_class
 from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene, scene_names
