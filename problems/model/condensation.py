@@ -27,8 +27,7 @@ from problems.stiffness.dense_block import mirrored
 from problems.storage import fingerprint
 
 from .banded_numbering import lines_across
-from .effect import PartLoadEffect
-from .part import PartModel
+from .part import PartLoadEffect, PartModel
 
 #: The folders whose code makes a part's stiffness.
 CODE = ("problems/model", "problems/effects")

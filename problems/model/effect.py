@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,9 +20,6 @@ from problems.forms.assembly import Matrix, Vector
 from .interface import AnyJoint, Pair
 from .joint import Faults, Table
 from .plate import Plate, Range
-
-if TYPE_CHECKING:
-    from .part import PartModel
 
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
@@ -182,35 +179,6 @@ class StiffnessEffect(ElementEffect):
         -------
         (plate.size, plate.size) csr_array
             Symmetric but for rounding, N/mm for deflections; coupling only neighbouring grid lines y = const.
-        """
-
-
-class PartLoadEffect(ElementEffect):
-    """A load on one part, in the junction or beyond it; it is condensed onto the junction."""
-
-    @abstractmethod
-    def load(self, model: PartModel) -> Vector:
-        """The load on all unknowns of the part.
-
-        Parameters
-        ----------
-        model : PartModel
-            The elements of the part (`model.plate`) and the StiffnessEffects that act on it.
-
-        Returns
-        -------
-        (plate.size,) ndarray
-            Generalised forces: N on a deflection, N·mm on a slope, N·mm² on a twist.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from problems.effects.self_weight import SelfWeight
-        >>> from problems.model.part import PartModel
-        >>> plate = Plate(np.linspace(0, 400, 5), np.linspace(0, 100, 3), 2.0, 70e3, 0.3)
-        >>> f = SelfWeight(kind="self_weight", part="skin").load(PartModel(plate, (), range(3)))
-        >>> f.shape, round(sum(f[plate.deflection_dofs(line)].sum() for line in range(3)), 4)  # N
-        ((60,), 2.1182)
         """
 
 

@@ -27,10 +27,10 @@ from problems.stiffness.sparse_block import sparse_block
 from problems.storage import fingerprint
 
 from .banded_numbering import Numbering
-from .effect import Effect, PartLoadEffect
+from .effect import Effect
 from .joint import Joint
 from .junction_terms import junction_load
-from .part import PartModel, graded
+from .part import PartLoadEffect, PartModel, graded
 from .scene import JointScene
 from .springs import Springs
 

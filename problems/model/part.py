@@ -12,6 +12,7 @@ as wide, and what costs its cube an eighth.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,9 +21,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Indices
+from problems.forms.assembly import Indices, Vector
 
-from .effect import StiffnessEffect
+from .effect import ElementEffect, StiffnessEffect
 from .joint import Joint, Part
 from .plate import WHOLE, LineLoads, Plate, line_loads
 
@@ -93,6 +94,35 @@ class PartModel:
             areas += [(1.0, thickness, x, y), (-1.0, plate.thickness, x, y)]
         for sign, thickness, x, y in areas:
             yield sign, thickness, line_loads(plate.x, *x), line_loads(plate.y, *y)
+
+
+class PartLoadEffect(ElementEffect):
+    """A load on one part, in the junction or beyond it; it is condensed onto the junction."""
+
+    @abstractmethod
+    def load(self, model: PartModel) -> Vector:
+        """The load on all unknowns of the part.
+
+        Parameters
+        ----------
+        model : PartModel
+            The elements of the part (`model.plate`) and the StiffnessEffects that act on it.
+
+        Returns
+        -------
+        (plate.size,) ndarray
+            Generalised forces: N on a deflection, N·mm on a slope, N·mm² on a twist.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from problems.effects.self_weight import SelfWeight
+        >>> from problems.model.plate import Plate
+        >>> plate = Plate(np.linspace(0, 400, 5), np.linspace(0, 100, 3), 2.0, 70e3, 0.3)
+        >>> f = SelfWeight(kind="self_weight", part="skin").load(PartModel(plate, (), range(3)))
+        >>> f.shape, round(sum(f[plate.deflection_dofs(line)].sum() for line in range(3)), 4)  # N
+        ((60,), 2.1182)
+        """
 
 
 GROWTH = 1.2  # of the distance between lines, away from the junction
