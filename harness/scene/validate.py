@@ -20,8 +20,9 @@ from problems.build import model_of, prepared
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
-from problems.model.effect import PartLoadEffect, SpringEffect
+from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
+from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Finite, Positive
-from problems.model.effect import PartLoadEffect
-from problems.model.part import PartModel
+from problems.model.part import PartLoadEffect, PartModel
 
 KG_PER_M3_TIMES_M_PER_S2 = 1e-9  # N/mm³
 

@@ -8,10 +8,10 @@ from pydantic import Field
 
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Finite
-from problems.model.effect import Effect, PartLoadEffect
+from problems.model.effect import Effect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults
-from problems.model.part import PartModel
+from problems.model.part import PartLoadEffect, PartModel
 
 from .supports import Supports
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Finite, Positive
-from problems.model.effect import PartLoadEffect
-from problems.model.part import PartModel
+from problems.model.part import PartLoadEffect, PartModel
 
 
 class ThermalBending(PartLoadEffect):
