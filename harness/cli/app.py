@@ -5,8 +5,6 @@ Modules that are slow to import are imported inside the commands.
 
 from __future__ import annotations
 
-import ast
-import inspect
 import signal
 import sys
 from collections.abc import Callable
@@ -15,6 +13,8 @@ from io import TextIOWrapper
 from typing import Annotated
 
 import typer
+
+from harness.terminal.docstrings import docstring
 
 from .compare import compare
 from .exchange import export, import_, judge
@@ -117,17 +117,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 
 
-def help_of(command: Callable[..., None]) -> str:
-    """The docstring of a command, from its source where `python -OO` has dropped it."""
-    if command.__doc__:
-        return command.__doc__
-    (function,) = ast.parse(inspect.getsource(command)).body
-    return ast.get_docstring(function) or ""  # type: ignore[arg-type]
-
-
-app.callback(help=help_of(harness))(harness)
+app.callback(help=docstring(harness))(harness)
 for name, command in COMMANDS.items():
-    app.command(name, help=help_of(command))(command)
+    app.command(name, help=docstring(command))(command)
 
 
 def main() -> None:

@@ -43,14 +43,14 @@ def solve(
     reference_limit: ReferenceLimit = None,
     allow_gap: AllowGap = None,
     refine: Annotated[
-        bool, typer.Option("--refine", help="Estimate what the grid leaves out from a finer one too.")
+        bool, typer.Option("--refine", help="Estimate the mesh error from a finer mesh, too.")
     ] = False,
 ) -> None:
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
 
     Without --solver the answer comes with a proven bound on its error; with --solver it is judged against
-    that answer. If the parts do not meet, this is a linear solve. How much the finite-element grid leaves out
-    of a gap is estimated from a coarser one.
+    that answer. If the parts do not meet, this is a linear solve. The error of the finite-element mesh is
+    estimated from a coarser one.
 
     Two scenes with the same contacts, such as two plans of fasteners, are solved into DIR/first and
     DIR/second and compared: gaps side by side, a map of the difference, the force in each fastener.

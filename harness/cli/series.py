@@ -100,13 +100,13 @@ def series(
         from harness.results.atomic_output import refuse_inputs, refuse_unwritable
         from harness.results.schema import SERIES
         from harness.results.series_file import read_facts
-        from harness.scene.allowed_gap import check_series, refuse_unusable, show_series
+        from harness.scene.allowed_gap import check_series, refuse_unusable
         from harness.scene.validate import print_unusual
         from harness.series.load_case_source import RANDOM, GivenCases
         from harness.series.run import run
         from harness.series.session import Job
         from harness.terminal import DONE, NOTHING_JUDGED
-        from harness.terminal.console import ConsoleReporter
+        from harness.terminal.console import ConsoleReporter, show_verdict
         from problems.errors import Fault, InputError
         from problems.load_cases.sweep import sweep as swept
         from problems.scene_files import read_scene
@@ -151,5 +151,5 @@ def series(
 
             console.print(f"Report: {write(out)}")
         if verdict:
-            code = show_series(verdict, console) or code
+            code = show_verdict(verdict["kind"], verdict["said"], console) or code
         raise typer.Exit(code)

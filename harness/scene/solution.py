@@ -34,11 +34,12 @@ class Solution:
     """An answer to a scene.
 
     lam : (m,) contact forces, N; NaN if the solver gives none. gap : (m,) the remaining gaps, g − Aᵀx, mm.
-    status, iterations : what the solver said; the reference has no iterations.
-    judgement : what the judge found. error_bound_mm : proven, max|x − x*| for the exact answer x*.
-    notes : what reading has rounded or symmetrised of a user's numbers.
-    method : who gave the answer. unknowns : (N,) those of the form. closest_mm : the smallest gap if contact
-    is ignored; None without contacts. seconds : of each step.
+    status, iterations : reported by the solver; the reference has no iterations.
+    judgement : the judge's figures. error_bound_mm : proven, max|x − x*| for the exact answer x*.
+    notes : sentences on numbers of the user that reading has rounded or symmetrised.
+    method : the name of the solver, or how the reference was proven. from_reference : whether the answer is
+    the reference. unknowns : (N,) mm, all of the form. closest_mm : the smallest gap if contact is ignored;
+    None without contacts. seconds : of each step. choice : of the form.
     """
 
     lam: Vector
@@ -49,6 +50,7 @@ class Solution:
     error_bound_mm: float
     notes: tuple[str, ...]
     method: str
+    from_reference: bool
     unknowns: Vector
     closest_mm: float | None
     seconds: dict[str, float]
@@ -123,11 +125,12 @@ def solve(
     for note in problem.prepared.assembly.notes:
         reporter.say(note)
     with step("answer with a proven bound"):
-        known = problem.reference
+        reference = problem.reference
     closest = float(-p.max()) if p.size else None
-    if named is None or closest is None or closest >= 0:
-        method = known.route if closest is not None and closest < 0 else LINEAR
-        answer = Answer("solved", known.lam, known.x)
+    has_contact = closest is not None and closest < 0
+    if named is None or not has_contact:
+        named, method = None, reference.route if has_contact else LINEAR
+        answer = Answer("solved", reference.lam, reference.x)
     else:
         name, chosen = named
         method = f"{name}, {choice.form} form, tolerance {tolerance:g}"
@@ -136,19 +139,20 @@ def solve(
     assembly, x = problem.prepared.assembly, np.asarray(answer.x, dtype=float)
     lam = np.full(assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
     judgement = problem.judged(x, lam, LIMIT_MM)
-    if answer.x is known.x:  # its error is the bound
-        proven = known.bound_mm <= LIMIT_MM
+    error = judgement.displacement_error_mm
+    if named is None:  # the error of the reference is its bound
+        proven, error = reference.bound_mm <= LIMIT_MM, 0.0
         judgement = replace(judgement, verdict="within" if proven else "cannot_be_judged")
-    error = 0.0 if answer.x is known.x else judgement.displacement_error_mm
     return Solution(
         lam=lam,
         gap=problem.load.g - assembly.A.T @ x,
         status=answer.status,
         iterations=answer.iterations,
         judgement=judgement,
-        error_bound_mm=np.inf if error is None else error + known.bound_mm,
+        error_bound_mm=np.inf if error is None else error + reference.bound_mm,
         notes=assembly.notes,
         method=method,
+        from_reference=named is None,
         unknowns=x,
         closest_mm=closest,
         seconds=seconds,

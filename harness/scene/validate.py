@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +12,7 @@ from rich.text import Text
 
 from harness.planning.form_choice import chosen_form, size_of
 from harness.results.provenance import physical_memory_mib
+from harness.terminal.docstrings import docstring
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import about, expected_error
@@ -25,6 +25,7 @@ from problems.model.joint import Joint
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
+from report.document.numbers import counted
 
 
 def validate(source: str, console: Console) -> None:
@@ -42,7 +43,8 @@ def validate(source: str, console: Console) -> None:
     console.print(f"{scene.name}: {scene.title}. Fine.")
     print_unusual(scene, console)
     console.print(_contents(scene))
-    console.print(f"n = {size.n} unknowns, m = {size.m} contacts; this machine has {physical} MiB.")
+    contacts = counted(size.m, "contact")
+    console.print(f"n = {size.n} unknowns, m = {contacts}; this machine has {physical} MiB.")
     cached = "; the assembly is in the cache" if model_of(scene).built else ""
     console.print(
         f"Dense forms: K, its factors and Q take {size.dense_mib:.0f} MiB{cached}, the process up to "
@@ -82,17 +84,17 @@ def _superelements(scene: JointScene, console: Console) -> None:
     assert isinstance(joint, SuperelementJoint)
     table = Table("what", "how many", title="What will be built")
     for part in joint.parts:
-        table.add_row(f"part {part.name}", f"{part.size} unknowns, {len(part.contacts)} contact nodes")
-    for pair, found in joint.pairings.items():
-        a, b = pair
-        beyond = f", {found.beyond} nodes of {a} are beyond {b}" if found.beyond else ""
-        table.add_row(f"contact {a} – {b}", f"{len(found.nodes)} nodes of {a}{beyond}")
+        nodes = counted(len(part.contacts), "contact node")
+        table.add_row(f"part {part.name}", f"{part.size} unknowns, {nodes}")
+    for (a, b), pairing in joint.pairings.items():
+        beyond = f", {pairing.beyond} more beyond {b}" if pairing.beyond else ""
+        table.add_row(f"contact {a} – {b}", f"{counted(len(pairing.nodes), 'node')} of {a}{beyond}")
     print_unusual(scene, console)
     console.print(_with_effects(table, scene))
     for part in joint.parts:
         rows = first_rows(part.nodes, (part.node, part.dof))
         console.print(Text(f"First rows of K of {part.name}: {rows}."))
-    x, y, normal = (", ".join(f"{each:.4g}" for each in axis) for axis in joint.axes)
+    x, y, normal = (", ".join(f"{value + 0.0:.12g}" for value in axis.round(12)) for axis in joint.axes)
     console.print(f"Points are given along x = ({x}) and y = ({y}); the normal of their plane is ({normal}).")
     _matrices(scene, console)
 
@@ -118,7 +120,7 @@ def _contents(scene: JointScene) -> Table:
 
 def _with_effects(table: Table, scene: JointScene) -> Table:
     for effect in scene.effects:
-        table.add_row(f"effect {effect.kind}", (inspect.getdoc(effect) or "").partition("\n")[0])
+        table.add_row(f"effect {effect.kind}", docstring(type(effect)).partition("\n")[0])
     return table
 
 

@@ -5,7 +5,7 @@ run: each row as it is finished, above a progress bar.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -26,7 +26,7 @@ from rich.text import Text
 from harness.results.records import Row
 from problems.reporter import Reporter
 
-from . import READER_GONE
+from . import DONE, GAP_EXCEEDED, NOTHING_JUDGED, READER_GONE
 
 #: Control characters except the line break, those that reverse the direction of text, lone surrogates, as in
 #: file names that are not UTF-8, and what is no character, which XML has no way to write.
@@ -99,6 +99,19 @@ class ConsoleReporter(Reporter):
 
 def _with_share(text: str, fraction: float) -> str:
     return f"{text} {fraction:.0%}" if fraction else text
+
+
+#: The exit code and colour of a verdict on an allowed gap, by its kind; "" where it cannot be told.
+VERDICTS = {"pass": (DONE, "green"), "fail": (GAP_EXCEEDED, "red"), "": (NOTHING_JUDGED, "yellow")}
+
+
+def show_verdict(kind: str, sentences: Sequence[str], console: Console) -> int:
+    """Print the sentences, the last one in the colour of the verdict; returns the exit code."""
+    code, style = VERDICTS[kind]
+    for sentence in sentences[:-1]:
+        console.print(sentence)
+    console.print(sentences[-1], style=style)
+    return code
 
 
 STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no_answer": "red"}

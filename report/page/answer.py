@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.document.numbers import listed, position, significant
+from report.document.numbers import counted, listed, position, significant
 from report.page.write import Data, banner
 from report.results.answer_record import Answer, fasteners, pair_name
 from report.results.series_results import Array
@@ -37,7 +37,7 @@ def facts(record: Data) -> list[list[str]]:
         "judged error, mm": record.get("judged_error_mm"),
         "error bound, mm": record.get("error_bound_mm"),
         "gaps proven to, mm": (record.get("allowed_gap") or {}).get("uncertainty_mm"),
-        "left out by the grid, mm (estimated)": (record.get("grid") or {}).get("error_mm"),
+        "mesh error, mm (estimated)": (record.get("grid") or {}).get("error_mm"),
         "unusual": "; ".join(record.get("unusual", ())) or None,
         "memory, MiB": record.get("peak_rss_mib"),
         **{f"{step}, s": seconds for step, seconds in record.get("steps", {}).items()},
@@ -54,7 +54,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     largest is and where. kind : "pass", "fail" or "" if neither can be said.
     """
     if not record["m"]:
-        return {"kind": "", "text": "The scene has no contact."}
+        return {"kind": "pass" if "allowed_gap" in record else "", "text": "The scene has no contact."}
     gap = arrays["gap_after"]
     worst = int(gap.argmax())
     pair = next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
@@ -65,11 +65,18 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     check = record.get("allowed_gap")
     if check is None:
         return {"kind": "", "text": f"{largest[0].upper()}{largest[1:]}."}
-    kinds = {None: ("", "CANNOT BE TOLD"), True: ("fail", "FAIL"), False: ("pass", "PASS")}
-    kind, word = kinds[check["exceeded"]]
-    near = ", closer to the limit than the grid can tell" if check.get("closer_than_grid_mm") else ""
+    limit = f"limit {check['allowed_mm']:g} mm"
+    near = ", closer to the limit than the mesh can tell" if check.get("closer_than_grid_mm") else ""
     near += f"; {check['beyond_scan']}" if "beyond_scan" in check else ""
-    return {"kind": kind, "text": f"{word}: limit {check['allowed_mm']:g} mm; {largest}{near}."}
+    if check["exceeded"] is None:
+        kind, verdict = "", f"CANNOT BE TOLD: {limit}, gaps are proven to {check['uncertainty_mm']:.1e} mm"
+    elif check["exceeded"]:
+        larger = f"at {len(check['contacts'])} of {counted(record['m'], 'contact')}"
+        where = f"{larger}, {check['share']:.1%} of the junction, between {', '.join(check['pairs'])}"
+        kind, verdict = "fail", f"FAIL: {limit}, exceeded {where}"
+    else:
+        kind, verdict = "pass", f"PASS: {limit}"
+    return {"kind": kind, "text": f"{verdict}; {largest}{near}."}
 
 
 def two_answers_data(answers: list[Answer]) -> Data:

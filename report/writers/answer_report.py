@@ -47,10 +47,6 @@ def write(directory: Path) -> Path:
     for name, table in files.items():
         csv_frame(table).to_csv(directory / f"{name}.csv", index=False)
     blocks: list[Block] = []
-    if check.get("exceeded"):
-        larger = f"{len(check['contacts'])} of {record['m']} contacts, {significant(100 * check['share'])} %"
-        text = f"**The gap is larger than {check['allowed_mm']} mm** at {larger} of the junction"
-        blocks.append(Text(f"{text}: [exceeding.csv](exceeding.csv)."))
     figures, vtu = {}, "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         figures = answer_figures(record, arrays)

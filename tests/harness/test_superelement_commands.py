@@ -79,7 +79,7 @@ def test_validate_says_what_there_is(folder: Path) -> None:
 def test_solve_writes_pictures_tables_and_forces(folder: Path, tmp_path: Path) -> None:
     done = harness("solve", folder / "edited.toml", "--out", tmp_path / "out", "--allow-gap", 5.0)
     assert done.exit_code == 0, done.output
-    assert "What the grid leaves out is not known here" in done.output
+    assert "Mesh error: not known here" in done.output
     refined = harness("solve", folder / "edited.toml", "--refine", "--out", tmp_path / "refined")
     assert refined.exit_code == 2
     record = json.loads((tmp_path / "out" / "solution.json").read_text())

@@ -218,10 +218,11 @@ def test_the_banners_name_the_code(tmp_path: Path) -> None:
         (
             True,
             "fail",
-            "FAIL: limit 0.2 mm; the largest gap left is 0.300 mm, at (1077.93, 0) mm (a – b)",
+            "FAIL: limit 0.2 mm, exceeded at 1 of 3 contacts, 33.3% of the junction, between a – b; the "
+            "largest gap left is 0.300 mm, at (1077.93, 0) mm (a – b)",
         ),
         (False, "pass", "PASS: limit 0.2 mm; "),
-        (None, "", "CANNOT BE TOLD: limit 0.2 mm; "),
+        (None, "", "CANNOT BE TOLD: limit 0.2 mm, gaps are proven to 1.0e-01 mm; "),
         ("not asked", "", "The largest gap left is 0.300 mm, at (1077.93, 0) mm"),
     ],
 )
@@ -232,7 +233,8 @@ def test_an_answer_opens_with_its_largest_gap(exceeded: Any, kind: str, begins: 
     }
     record: dict[str, Any] = {"m": 3, "pairs": [{"pair": ["a", "b"], "start": 0, "stop": 3}]}
     if exceeded != "not asked":
-        record["allowed_gap"] = {"exceeded": exceeded, "allowed_mm": 0.2}
+        exceeding = {"contacts": [1], "share": 1 / 3, "pairs": ["a – b"], "uncertainty_mm": 0.1}
+        record["allowed_gap"] = {"exceeded": exceeded, "allowed_mm": 0.2} | exceeding
     found = headline(record, arrays)
     assert found["kind"] == kind
     assert found["text"].startswith(begins)

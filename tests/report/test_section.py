@@ -103,7 +103,8 @@ def test_the_page_to_file_is_one_page(tmp_path: Path, count: int) -> None:
     ]
     record |= {"title": "A $joint_ of " + LETTERS * "two ", "scene": "here", "scene_key": "0" * 64, "n": 42}
     record |= {"method": "newton", "fasteners": forces, "grid": {"said": "Nothing is known"}, "steps": {}}
-    record |= {"allowed_gap": {"exceeded": True, "allowed_mm": 0.05}, "commit": "c0ffee"}
+    check = {"exceeded": True, "allowed_mm": 0.05, "contacts": [1], "share": 0.02, "pairs": ["a – b"]}
+    record |= {"allowed_gap": check, "commit": "c0ffee"}
     figure = section_figure(record, arrays)
     assert figure is not None
     figure.savefig(tmp_path / "section.png")

@@ -1,10 +1,10 @@
-"""What the grid leaves out of a gap, beside references on finer grids."""
+"""The estimated mesh error of a gap, beside references on finer meshes."""
 
 import numpy as np
 import pytest
 
 from harness import load_scene, own_matrices, solve
-from harness.scene.grid_error import estimated, recorded, regridded
+from harness.scene.mesh_error import estimated, moved_mm, recorded, remeshed
 from harness.scene.solution import Solution
 from problems.model.scene import JointScene
 
@@ -23,10 +23,8 @@ def strips(*effects: dict[str, object]) -> Solution:
 
 
 def finest(found: Solution, factor: float) -> float:
-    """How far the gaps are from those of a grid of `factor` times as many lines."""
-    from harness.scene.grid_error import _moved
-
-    return _moved(found, regridded(found.problem.scene.joint, factor))
+    """How far the gaps are from those of a mesh of `factor` times as many lines."""
+    return moved_mm(found, remeshed(found.problem.scene.joint, factor))
 
 
 PLANS = {
@@ -43,7 +41,7 @@ PLANS = {
 
 
 @pytest.mark.parametrize("plan", PLANS)
-def test_the_estimate_is_about_the_distance_to_a_far_finer_grid(plan: str) -> None:
+def test_the_estimate_is_about_the_distance_to_a_far_finer_mesh(plan: str) -> None:
     found = strips(*PLANS[plan])
     two, three = estimated(found), estimated(found, refine=True)
     true = finest(found, 4.0)
@@ -53,33 +51,33 @@ def test_the_estimate_is_about_the_distance_to_a_far_finer_grid(plan: str) -> No
     assert 0 < three.order < 4
 
 
-def test_a_coarser_grid_keeps_the_sides_and_one_element_at_least() -> None:
+def test_a_coarser_mesh_keeps_the_sides_and_one_element_at_least() -> None:
     joint = load_scene("gallery/measured-gap").joint
-    coarse = regridded(joint, 0.5)
+    coarse = remeshed(joint, 0.5)
     assert coarse.junction.nodes == (31, 6)
     assert [part.north.elements for part in coarse.part] == [2, 2]
     assert (coarse.x[-1], coarse.y[-1]) == (joint.x[-1], joint.y[-1])
-    assert regridded(regridded(coarse, 1e-3), 1e-3).junction.nodes == (2, 2)
-    assert regridded(joint, 2.0).junction.nodes == (121, 21)
+    assert remeshed(remeshed(coarse, 1e-3), 1e-3).junction.nodes == (2, 2)
+    assert remeshed(joint, 2.0).junction.nodes == (121, 21)
 
 
-def test_an_answer_without_a_coarser_grid_says_so() -> None:
+def test_an_answer_without_a_coarser_mesh_says_so() -> None:
     single = {"junction": {"length": 300.0, "width": 60.0, "nodes": [2, 2]}, "part": STRIPS["part"]}
     gap = {"kind": "initial_gap", "mean": 0.5}
     assert estimated(solve({"joint": single, "effect": [gap]}, form="sparse")) is None
     given = own_matrices(np.eye(2), np.eye(2), [1.0, 2.0], [0.5, 3.0])
-    assert recorded(estimated(solve(given))) == {"said": "What the grid leaves out is not known here"}
+    assert recorded(estimated(solve(given))) == {"said": "Mesh error: not known here"}
 
 
-def test_gaps_that_no_grid_moves_leave_nothing_out() -> None:
-    """Parts that nothing presses keep their gap on every grid."""
+def test_gaps_that_no_mesh_moves_leave_nothing_out() -> None:
+    """Parts that nothing presses keep their gap on every mesh."""
     found = solve({"joint": STRIPS, "effect": [{"kind": "initial_gap", "mean": 0.5}]}, form="sparse")
     assert isinstance(found.problem.scene, JointScene)
     assert estimated(found).error_mm < 1e-12
     assert estimated(found, refine=True).error_mm < 1e-12
 
 
-def test_a_grid_without_an_answer_costs_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_without_an_answer_costs_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     found = strips(*PLANS["pressure"])
-    monkeypatch.setattr("harness.scene.grid_error.candidates", lambda *_: iter(()))
+    monkeypatch.setattr("harness.scene.mesh_error.candidates", lambda *_: iter(()))
     assert estimated(found) is None

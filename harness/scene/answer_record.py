@@ -1,0 +1,162 @@
+"""The files of an answer, from which the report draws it: the arrays solution.npz, the record solution.json.
+
+The record holds how the scene was solved, in which steps and time, what was skipped, and the error bound. It
+also says where parts and contacts are in x and λ, what a picture marks, and the force in each fastener. An
+installed fastener is a spring of stiffness k along t = w_a − w_b, set at the approach a: it pulls its parts
+together with k (a − tᵀx), N, and pushes them apart where that is negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from itertools import product, repeat
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from harness.results.provenance import machine, provenance, resident_mib
+from problems.forms.assembly import Assembly, Vector
+from problems.model.effect import Effect, SpringEffect
+from problems.model.interface import AnyJoint
+from problems.model.joint import Joint
+from problems.model.positions import FORCES
+from problems.model.scene import JointScene, MatricesScene, Scene
+from problems.reporter import Stage
+
+from .solution import Solution
+from .validate import digits_sentence
+
+
+def arrays_of(solution: Solution) -> dict[str, Any]:
+    """The arrays of DIR/solution.npz.
+
+    Where parts keep more than the displacement along the normal of each node, x and A have these
+    displacements alone, and `unknowns` is all of x.
+    """
+    assembly, scene = solution.problem.prepared.assembly, solution.problem.scene
+    x, A, nodes, more = solution.x, assembly.asked_contacts, assembly.asked_nodes, {}
+    if isinstance(scene, JointScene) and (D := scene.joint.shown) is not None:
+        more, x, A = {"unknowns": x}, D @ x, sp.csc_array(D @ A)
+        nodes = np.concatenate([scene.joint.nodes_of(name) for name in scene.joint.names])
+    gaps = {"gap_before": solution.problem.load.g, "gap_after": solution.gap}
+    arrays = more | gaps | {"x": x, "lam": solution.lam}
+    arrays |= {"A_data": A.data, "A_indices": A.indices, "A_indptr": A.indptr}
+    return arrays if nodes is None else arrays | {"nodes": nodes, "contact_nodes": assembly.contact_nodes}
+
+
+def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[str, Any]:
+    """The record DIR/solution.json. built : the stages that the cache did not hold. solver : asked for."""
+    problem, judgement = solution.problem, solution.judgement
+    scene, data, reference = problem.scene, problem.prepared, problem.reference
+    return {
+        "method": solution.method,
+        "status": solution.status,
+        "verdict": judgement.verdict,
+        "judged_error_mm": None if solution.from_reference else judgement.displacement_error_mm,
+        "iterations": solution.iterations,
+        "scene": scene.name,
+        "title": scene.title,
+        "scene_key": scene.key,
+        "form": problem.form,
+        "n": data.assembly.asked,
+        "unknowns": data.assembly.n,
+        "m": data.assembly.m,
+        "cond_K": data.facts.get("cond_K"),
+        "qp": solution.has_contact,
+        "closest_mm": solution.closest_mm,
+        "error_bound_mm": reference.bound_mm,
+        "route": reference.route,
+        "unusual": scene.unusual if isinstance(scene, JointScene) else [],
+        **layout(scene, data.assembly),
+        "fasteners": fastener_forces(scene, solution.x),
+        "digits": digits_sentence(problem, solved=True)[0] if _is_given(scene) else None,
+        "skipped": list(_skipped(solution, built, solver)),
+        "steps": solution.seconds,
+        "peak_rss_mib": resident_mib("VmHWM"),
+        "machine": machine()["machine"],
+        **provenance(),
+        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _skipped(solution: Solution, built: set[Stage], solver: str | None) -> Iterator[str]:
+    if not solution.has_contact:
+        instead = f"; {solver} was not run" if solver else ""
+        why = "The scene has no contact"
+        if solution.closest_mm is not None:
+            closest = f"the closest contact stays {solution.closest_mm:.3g} mm open"
+            why = f"The answer without contact violates no gap, {closest}"
+        yield f"the quadratic program: it was not called for. {why}{instead}"
+    if solution.problem.form == "sparse":
+        yield "condensation, dense factors and Q: the sparse model was solved as it is"
+    elif not built:
+        yield "condensation, Cholesky factors and Q: the assembly came from the cache"
+    elif is_of_plates(solution.problem.scene) and Stage.CONDENSATION not in built:
+        yield "condensation: the parts came from the cache"
+
+
+def _is_given(scene: Scene) -> bool:
+    """Whether the entries of its K were read from files."""
+    return isinstance(scene, MatricesScene) or (isinstance(scene, JointScene) and not is_of_plates(scene))
+
+
+def is_of_plates(scene: Scene) -> bool:
+    """Whether its joint is made of plates, so that their mesh is known."""
+    return isinstance(scene, JointScene) and isinstance(scene.joint, Joint)
+
+
+def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
+    """The ranges of parts in the displacements shown and of pairs in λ, and what a picture marks."""
+    if not isinstance(scene, JointScene):
+        nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
+        spans = zip(assembly.parts, assembly.K.slices, strict=True)
+        parts = [_part(name, s.start, s.stop, _extent(nodes[s])) for name, s in spans]
+        pairs = [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else []
+        return {"parts": parts, "pairs": pairs, "marks": {}}
+    joint, parts, start = scene.joint, [], 0
+    for name in joint.names:
+        stop, (outline, clamped) = start + len(joint.nodes_of(name)), joint.outline(name)
+        held = [point for e in scene.stiffness_effects if e.part == name for point in e.held_points]
+        parts.append(_part(name, start, stop, outline, clamped, held))
+        start = stop
+    pairs = [{"pair": p, "start": joint.span(p).start, "stop": joint.span(p).stop} for p in joint.pairs]
+    marks: dict[str, list[list[float]]] = {}
+    for effect in scene.effects:
+        if len(points := effect.marks(joint)):
+            marks.setdefault(effect.kind, []).extend(points.tolist())
+    return {"parts": parts, "pairs": pairs, "marks": marks}
+
+
+def _part(
+    name: str, start: int, stop: int, outline: list[float], clamped: Sequence[str] = (), supports: Any = ()
+) -> dict[str, Any]:
+    ends = {"name": name, "start": start, "stop": stop, "outline": outline}
+    return ends | {"clamped": list(clamped), "supports": list(supports)}
+
+
+def _extent(nodes: Vector) -> list[float]:
+    """The smallest and largest x, then y, of some nodes."""
+    return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist()
+
+
+def fastener_forces(scene: Scene, x: Vector) -> list[dict[str, Any]]:
+    """One entry per fastener and contact: kind, pair, x and y in mm, force_N. x : (n,) mm."""
+    if not isinstance(scene, JointScene):
+        return []
+    return [entry for effect in scene.effects for entry in _of_effect(effect, scene.joint, x)]
+
+
+def _of_effect(effect: Effect, joint: AnyJoint, x: Vector) -> Iterator[dict[str, Any]]:
+    fastener: Any = effect  # its kind is not imported here, so that no other is
+    if isinstance(effect, SpringEffect):
+        T, k = effect.springs(joint)
+        pairs, forces = effect.tied(joint), (k * (fastener.approach - T.T @ x)).tolist()
+    elif preloads := [getattr(effect, name) for name in FORCES if hasattr(effect, name)]:
+        pairs, forces = fastener.pairs(joint), repeat(*preloads)
+    else:
+        return
+    places = product(pairs, fastener.marks(joint).tolist())
+    for (pair, (x, y)), force in zip(places, forces, strict=False):
+        yield {"kind": effect.kind, "pair": list(pair), "x": x, "y": y, "force_N": force}
