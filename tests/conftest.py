@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from forked_processes import fork_measuring_processes
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 
@@ -22,6 +23,13 @@ def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
         yield
+
+
+@pytest.fixture(autouse=True)
+def _forked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fork measuring processes, unless the start of one is the point of a test."""
+    if not request.node.get_closest_marker("starts"):
+        fork_measuring_processes(monkeypatch)
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from harness.measurement import child_process
 from harness.measurement.worker import measure
 from harness.planning.plan import Measurement
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.starts]
 
 MIB = 300
 
