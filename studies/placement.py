@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.placement.candidates import ROWS, Movable, Place, Plan, grid, plan_of
+from harness.placement.candidates import ROWS, MovableFasteners, Place, Plan, grid, plan_of
 from harness.placement.search import Search, Step, onto
 from harness.placement.session import Outcome, PlanSession, Question, Study
 from problems.forms.assembly import Matrix
@@ -64,10 +64,10 @@ class Counted:
 
 def opened(
     table: dict[str, Any], preload: float, sd: float, length: float, cases: int
-) -> tuple[Movable, PlanSession]:
+) -> tuple[MovableFasteners, PlanSession]:
     gap = {"kind": "initial_gap", "mean": 0.4, "random": {"sd": sd, "correlation_length": length, "seed": 0}}
     fasteners = {"kind": "fasteners", "preload": preload, "pattern": {"columns": 5, "rows": 1}}
-    movable = Movable.of(scene_of({"title": "", "joint": table, "effect": [gap, fasteners]}))
+    movable = MovableFasteners.of(scene_of({"title": "", "joint": table, "effect": [gap, fasteners]}))
     gaps = random_gaps(movable.bare, cases, 0)
     return movable, PlanSession(Study(movable.bare, movable.fastener, gaps, "dual"))
 

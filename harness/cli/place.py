@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from . import options
 from .options import error_reporting, option
-
-if TYPE_CHECKING:
-    from problems.load_cases import LoadCases
-    from problems.model.scene import Scene
 
 
 def place(
@@ -60,52 +56,24 @@ def place(
     with error_reporting(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
-        from harness.measurement.solver_descriptions import described
-        from harness.placement.candidates import Movable
-        from harness.placement.fresh_cases import Goal
-        from harness.placement.run import OUTPUTS, run
-        from harness.placement.session import Study
-        from harness.planning.form_choice import chosen_form
-        from harness.results.atomic_output import refuse_inputs
-        from harness.scene.allowed_gap import refuse_unusable
-        from harness.scene.validate import print_unusual
-        from harness.series.load_case_source import RANDOM, GivenCases
+        from harness.placement.run import place as place_fasteners
+        from harness.series.load_case_source import GapCases
+        from harness.terminal import DONE, GAP_EXCEEDED
         from harness.terminal.console import ConsoleReporter
-        from problems.build import load_case
-        from problems.effects.initial_gap import InitialGap
-        from problems.errors import Fault, InputError
-        from problems.load_cases import Listed
-        from problems.scene_files import read_scene
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        refuse_unusable(allow_gap)
-        inputs = [Path(each) for each in (scene, candidates, around, gaps) if each]
-        refuse_inputs([out / name for name in OUTPUTS], inputs)
-        read = read_scene(scene)
-        movable = Movable.of(read)
-        holes = movable.candidates(candidates)
-        given = GivenCases(cases, seed, mean, sd, correlation_length, around, gaps)
-        faults = given.faults()
-        if allow_gap is None and count is None:
-            faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
-        if count is not None and count > len(holes):
-            faults.append(Fault("--count", "N", count, f"at most {len(holes)}, the candidates"))
-        if faults:
-            raise InputError(faults)
-        one = not (gaps or given.drawn or cases) and not any(
-            each.random for each in movable.bare.effects_of(InitialGap)
+        placement = place_fasteners(
+            scene,
+            out,
+            candidates=candidates,
+            allow_gap_mm=allow_gap,
+            count=count,
+            share=share,
+            cases=GapCases(cases, seed, mean, sd, correlation_length, around, gaps),
+            scheduler=scheduler,
+            reporter=ConsoleReporter(console, plain=True),
         )
-        total = 1 if one else cases or RANDOM
-        (made,) = described([("newton", {})], None, "--solver", ConsoleReporter(console))
-        choice = chosen_form(movable.bare, made.forms, None, total * len(holes))
-
-        def cases_of(of: Scene) -> LoadCases:
-            return Listed((load_case(of, choice.form),)) if one else given.of(of, choice.form)
-
-        bare = cases_of(movable.bare)
-        print_unusual(movable.bare, console, bare.notes)
-        share = share if share is not None else (1.0 if bare.count == 1 else 0.95)
-        study = Study(movable.bare, movable.fastener, bare, choice.form)
-        facts = {"solver_version": made.version, "solver_code": made.code}
-        goal = Goal(allow_gap, share, count)
-        raise typer.Exit(run(scene, movable, holes, goal, cases_of, study, facts, out, console, scheduler))
+        console.print(f"Report: {placement.report}")
+        style = "green" if placement.passed else "red"
+        console.print(placement.sentence, style=style, soft_wrap=True)
+        raise typer.Exit(DONE if placement.passed else GAP_EXCEEDED)

@@ -102,7 +102,7 @@ def series(
         from harness.results.series_file import read_facts
         from harness.scene.allowed_gap import check_series, refuse_unusable
         from harness.scene.validate import print_unusual
-        from harness.series.load_case_source import RANDOM, GivenCases
+        from harness.series.load_case_source import RANDOM, GapCases
         from harness.series.run import run
         from harness.series.session import Job
         from harness.terminal import DONE, NOTHING_JUDGED
@@ -112,7 +112,7 @@ def series(
         from problems.scene_files import read_scene
 
         refuse_unusable(allow_gap)
-        given = GivenCases(cases, seed, mean, sd, correlation_length, around, gaps)
+        given = GapCases(cases, seed, mean, sd, correlation_length, around, gaps)
         faults = given.faults(sweep or ())
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))

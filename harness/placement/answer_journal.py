@@ -19,17 +19,18 @@ from problems.storage import digest
 PLANS = "plans.jsonl"
 
 
-class Asked:
-    """identity : what must be the same for kept answers to be answers. executor, count : the workers, or None
-    for this process.
+class AnswerJournal:
+    """Answers questions: from the file at `path`, else now, and the file then has the answer too.
 
-    Raises InputError if PATH has the answers of another search, or a damaged line: nothing proves them anew.
+    identity : what decides the answers. pool : the workers and their number; None: this process answers.
+
+    Raises InputError if the file has another identity, or a damaged line: nothing proves its answer anew.
     """
 
     def __init__(
-        self, study: Study, path: Path, identity: dict[str, Any], workers: tuple[Executor, int] | None
+        self, study: Study, path: Path, identity: dict[str, Any], pool: tuple[Executor, int] | None
     ) -> None:
-        self.study, self.path, self.workers = study, path, workers
+        self.study, self.path, self.pool = study, path, pool
         records.remove_torn_line(path)
         first, *rows = records.read(path) or [{}]
         if not first:
@@ -39,26 +40,26 @@ class Asked:
         for number, row in enumerate(rows, start=2):
             if row.pop("hash", None) != digest(to_line(row)):
                 raise InputError.one(path, f"line {number}", "damaged", "remove it: it is answered anew")
-        self.known = {to_line(row["question"]): list(map(_outcome, row["outcomes"])) for row in rows}
+        self.answers = {to_line(row["question"]): list(map(_outcome, row["outcomes"])) for row in rows}
 
     def __call__(self, questions: Sequence[Question]) -> list[list[Outcome]]:
         texts = [to_line(asdict(question)) for question in questions]
-        new = {text: q for text, q in zip(texts, questions, strict=True) if text not in self.known}
-        if self.workers is None:
+        new = {text: q for text, q in zip(texts, questions, strict=True) if text not in self.answers}
+        if self.pool is None:
             for text, question in new.items():
                 self._keep(text, question, answer((self.study, question)))
         else:
             tasks = ((text, (self.study, question)) for text, question in new.items())
-            for text, found in done_as_completed(*self.workers, answer, tasks):
-                if isinstance(found, BaseException):
-                    raise found
-                self._keep(text, new[text], found)
-        return [self.known[text] for text in texts]
+            for text, outcomes in done_as_completed(*self.pool, answer, tasks):
+                if isinstance(outcomes, BaseException):
+                    raise outcomes
+                self._keep(text, new[text], outcomes)
+        return [self.answers[text] for text in texts]
 
-    def _keep(self, text: str, question: Question, found: list[Outcome]) -> None:
-        row = {"question": asdict(question), "outcomes": list(map(asdict, found))}
+    def _keep(self, text: str, question: Question, outcomes: list[Outcome]) -> None:
+        row = {"question": asdict(question), "outcomes": list(map(asdict, outcomes))}
         records.append(self.path, row | {"hash": digest(to_line(row))})
-        self.known[text] = found
+        self.answers[text] = outcomes
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:

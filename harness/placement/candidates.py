@@ -27,55 +27,58 @@ DIGITS = 6  # of a place in mm: to the nanometre
 
 
 @dataclass(frozen=True)
-class Movable:
-    """bare : the scene without its fasteners. fastener : one of them, for its preload and contact. own : the
-    places where the scene has them.
+class MovableFasteners:
+    """bare : the scene without its fasteners. fastener : one of them, for its preload and the parts that it
+    joins. current : the places where the scene has them.
     """
 
     bare: JointScene
     fastener: Fasteners
-    own: Plan
+    current: Plan
 
     @classmethod
-    def of(cls, scene: Scene) -> Movable:
+    def of(cls, scene: Scene) -> MovableFasteners:
         """Raises InputError as `movable_fasteners` does, and if two are at one place."""
-        found = movable_fasteners(scene)
+        fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
-        others = tuple(effect for effect in scene.effects if effect not in found)
-        marks = np.concatenate([each.marks(scene.joint) for each in found])
+        others = tuple(effect for effect in scene.effects if effect not in fasteners)
+        marks = np.concatenate([each.marks(scene.joint) for each in fasteners])
         if twice := _twice(marks, f"scene {scene.name}"):
             raise InputError(twice)
-        return cls(replace(scene, effects=others), found[0], plan_of(marks))
+        return cls(replace(scene, effects=others), fasteners[0], plan_of(marks))
 
-    def candidates(self, asked: str | None) -> Plan:
-        """The places of a pattern `4x32`, rows × columns of the junction's cells, of a CSV with columns x and
-        y, or by default those of the scene. Raises InputError if one is off the parts, or there twice.
+    def candidates(self, holes: str | None) -> Plan:
+        """The holes that fasteners may go into.
+
+        holes : a pattern `4x32`, rows × columns of equal cells of the junction, or the path of a CSV with
+        columns x and y, mm; None: where the scene's fasteners are. Raises InputError if a hole is off the
+        parts, or there twice.
         """
-        if asked is None:
-            return self.own
-        if pattern := ROWS_AND_COLUMNS.fullmatch(asked):
-            rows, columns = (int(each or 0) for each in pattern.groups())
+        if holes is None:
+            return self.current
+        if pattern := ROWS_AND_COLUMNS.fullmatch(holes):
+            rows, columns = (int(number or 0) for number in pattern.groups())
             if not 0 < rows * columns <= MOST:
                 allowed = f"rows x columns, 1 to {MOST} holes, or a CSV file"
-                raise InputError.one("--candidates", "holes", asked, allowed)
+                raise InputError.one("--candidates", "holes", holes, allowed)
             points, faults = grid(self.bare, rows, columns), []
         else:
-            read = read_columns(Path(asked), {"x": "x", "y": "y"})
-            points, faults = np.array(read.rows).reshape(-1, 2), read.faults
-        faults = faults + self.faults(points, asked)
+            table = read_columns(Path(holes), {"x": "x", "y": "y"})
+            points, faults = np.array(table.rows).reshape(-1, 2), table.faults
+        faults = faults + self.faults(points, holes)
         if faults:
             raise InputError(faults)
         return plan_of(points)
 
     def faults(self, points: Matrix, source: str) -> list[Fault]:
-        """Of points off the parts, there twice, or where a fastener is installed."""
+        """One fault for each point off the parts, there twice, or where a fastener is installed."""
         joint = self.bare.joint
         on = joint.covers(self.fastener.parts(joint), points)
-        found = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in np.flatnonzero(~on)]
+        faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in np.flatnonzero(~on)]
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
         for installed in self.bare.effects_of(SpringEffect):
-            found += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
-        return found + _twice(points, source)
+            faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
+        return faults + _twice(points, source)
 
 
 def movable_fasteners(scene: Scene) -> list[Fasteners]:
@@ -83,15 +86,15 @@ def movable_fasteners(scene: Scene) -> list[Fasteners]:
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):
         raise InputError.one(where, "assembly", "own matrices", "fasteners move on a joint only")
-    found = list(scene.effects_of(Fasteners))
-    if not found:
+    fasteners = list(scene.effects_of(Fasteners))
+    if not fasteners:
         allowed = 'an [[effect]] kind = "fasteners": its preload is that of each one'
         raise InputError.one(where, "effect", "no fasteners", allowed)
     for name in ("preload", "between"):
-        values = [getattr(each, name) for each in found]
+        values = [getattr(effect, name) for effect in fasteners]
         if any(value != values[0] for value in values):
             raise InputError.one(where, f"fasteners.{name}", values, "the same in all: they change places")
-    return found
+    return fasteners
 
 
 def _twice(points: Matrix, source: str) -> list[Fault]:
@@ -103,7 +106,9 @@ def plan_of(points: Matrix) -> Plan:
 
 
 def uniform_plans(bare: JointScene, count: int) -> list[Plan]:
-    """Of so many fasteners, in rows that differ by one at most: at the middles of equal cells."""
+    """Plans of `count` fasteners in 1 to 4 rows, at the middles of equal cells; the rows differ by one
+    fastener at most.
+    """
     plans = []
     for rows in ROWS[:count]:
         columns = [count // rows + (row < count % rows) for row in range(rows)]
@@ -113,10 +118,10 @@ def uniform_plans(bare: JointScene, count: int) -> list[Plan]:
 
 
 def grid(scene: JointScene, rows: int, columns: int) -> Matrix:
-    """(rows columns, 2) the middles of equal cells of the junction."""
+    """The middles (rows · columns, 2) of equal cells of the junction, mm."""
     low, high = scene.joint.bounds
     x, y = (
         start + (np.arange(count) + 0.5) * (stop - start) / count
         for start, stop, count in zip(low, high, (columns, rows), strict=True)
     )
-    return np.column_stack([each.ravel() for each in np.meshgrid(x, y)])
+    return np.column_stack([values.ravel() for values in np.meshgrid(x, y)])

@@ -1,30 +1,32 @@
-"""Whether a plan keeps a limit in a share s of the load cases: decided by fresh cases, which chose nothing.
+"""Decides by fresh load cases, which did not choose the plan, whether it keeps a limit in a share s of all.
 
-In the K cases that choose a plan, half as many may fail as in all, ⌊(1 − s) K / 2⌋. N fresh cases follow. It
-keeps the limit if the exact interval of Clopper and Pearson for its share begins at s or above, which is so
-if at most c of them fail:
+Of the K cases that choose a plan, ⌊(1 − s) K / 2⌋ may fail: half as many as s allows. N fresh cases then
+decide. The plan is shown to keep the limit if at most c of them fail, where c is the largest number with
 
     Σ_{i ≤ c} C(N, i) (1 − s)^i s^(N − i) ≤ α_r / 2,   α_r = 0.05 / 2^r.
 
-N is the least, with its c, for which a plan that fails half as often as s allows passes with probability 0.8.
-Otherwise K is doubled, the search begins again, and cases that were never used decide: at most ROUNDS times.
-As Σ α_r < 0.05, all intervals of a search hold with 95 % together, whenever it ends. Where s = 1, N = K and
-c = 0: no number of cases shows that none fails, and the interval says how many it may be.
+Then the exact interval of Clopper and Pearson for the plan's share begins at s or above. N is the smallest
+number for which a plan that fails half as often as s allows passes with probability 0.8.
 
-A table of gaps ends: its odd rows are held back, r = 0, and there is one round.
+If the plan does not pass, K is doubled, the search begins again, and cases that were never used decide: round
+r = 1, 2, …, ROUNDS. As Σ α_r < 0.05, the intervals of all rounds hold together with 95 % confidence. For
+s = 1, N = K and c = 0: no number of cases shows that none fails, but the interval bounds how many may.
+
+A table of measured gaps is finite: its odd rows are held back, and there is one round, r = 0.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count, islice
-from math import ceil, comb, floor, log
+from math import ceil, comb, floor, log, log10
 
 from harness.placement.candidates import Plan
 from harness.placement.search import FEW, PLANS, Search, Step, Values
 from problems.errors import InputError
+from report.document.numbers import counted
 
 ALPHA = 0.05
 CONFIDENCE = 1 - ALPHA
@@ -35,14 +37,18 @@ MOST = 10**7  # fresh cases
 
 @dataclass(frozen=True)
 class Goal:
-    """The fewest fasteners with which at least `share` of the cases keep limit_mm, or the best `count`."""
+    """What is searched for: the fewest fasteners with which at least `share` of the cases keep limit_mm, or
+    the best plan of `count` fasteners.
+    """
 
     limit_mm: float | None
     share: float
     count: int | None
 
     def allowed(self, cases: int) -> int:
-        """How many of the cases that choose may fail. Raises InputError if as many cannot show the share."""
+        """How many of the `cases` that choose a plan may fail. Raises InputError if they are too few to show
+        the share.
+        """
         if self.share < 1 and self.share**cases > ALPHA:
             allowed = f"{cases} cases cannot show it: take {self.least(ALPHA)}, or a share of 1"
             raise InputError.one("--share", "share", self.share, allowed)
@@ -53,7 +59,7 @@ class Goal:
         return ceil(log(alpha) / log(self.share))
 
     def fresh(self, alpha: float) -> int:
-        """N, for a share below 1."""
+        """N, the number of fresh cases, for a share below 1."""
         from scipy.stats import binom  # slow to import
 
         q = 1 - self.share
@@ -64,7 +70,7 @@ class Goal:
         return next(n for c, n in sizes if binom.cdf(c, n, q / 2) >= POWER)
 
     def failing(self, cases: int, alpha: float) -> int:
-        """c, of so many fresh cases; -1 if they cannot show the share."""
+        """c, how many of the fresh `cases` may fail; -1 if they are too few to show the share."""
         from scipy.stats import binom
 
         shown = binom.cdf(range(cases), cases, 1 - self.share) <= alpha / 2
@@ -75,7 +81,7 @@ class Goal:
 class Cases:
     """The numbers of load cases in the order of their use; the first `choosing` choose a plan.
 
-    table : whether that are all.
+    table : whether they are the rows of a table, so that there are no others.
     """
 
     numbers: Sequence[int]
@@ -84,7 +90,9 @@ class Cases:
 
     @classmethod
     def of(cls, count: int, table: bool, goal: Goal) -> Cases:
-        """count : that choose; of a table, all. Raises InputError if they cannot show the share."""
+        """count : how many choose a plan; of a table, all its rows. Raises InputError if they are too few to
+        show the share.
+        """
         if table and count > 1:
             if goal.failing(count // 2, ALPHA) < 0:
                 least = 2 * goal.least(ALPHA / 2)
@@ -97,19 +105,21 @@ class Cases:
 
 @dataclass(frozen=True)
 class Sample:
-    """Fresh cases of a plan. step : its gap_mm is what all but c of them keep. what : the name of the cases.
-    kept : how many keep the limit, or without one that gap. interval : of the share of all cases that do.
+    """A plan in fresh cases.
+
+    step : its gap_mm is the limit that all but c of them keep. cases : what they are called. kept : how many
+    keep the goal's limit, or gap_mm if there is none. interval : of the share of all cases that do.
     """
 
     step: Step
     numbers: Sequence[int]
-    what: str
+    cases: str
     kept: int
     interval: tuple[float, float]
 
     @classmethod
     def of(cls, plan: Plan, search: Search, goal: Goal, cases: Cases, fresh: slice, alpha: float) -> Sample:
-        """fresh : of the cases' numbers."""
+        """fresh : which of the cases' numbers."""
         from scipy.stats import binomtest
 
         numbers = cases.numbers[fresh]
@@ -118,14 +128,28 @@ class Sample:
         limit = step.gap_mm if goal.limit_mm is None else goal.limit_mm
         kept = sum(gap <= limit for gap in step.outcome.largest)
         low, high = binomtest(kept, count).proportion_ci(1 - alpha, "exact")
-        what = "held-back row" if cases.table else "fresh case"
-        return cls(step, numbers, f"{what}s" if count > 1 else what, kept, (float(low), float(high)))
+        name = "held-back row" if cases.table else "fresh case"
+        return cls(step, numbers, f"{name}s" if count > 1 else name, kept, (float(low), float(high)))
+
+    def sentence(self, goal: Goal, which: str = "") -> str:
+        """3 fasteners keep 0.12 mm in 96.7 % of 300 fresh cases (95 % interval 94.0 to 98.4 %)"""
+        step, cases = self.step, len(self.numbers)
+        plan = f"{which}{counted(len(step.plan), 'fastener')} {'keeps' if len(step.plan) == 1 else 'keep'}"
+        digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
+        share, low, high = (f"{100 * value:.{digits}f}" for value in (self.kept / cases, *self.interval))
+        limit = f"{step.gap_mm:.3g}" if goal.limit_mm is None else f"{goal.limit_mm:g}"
+        of = f"all {cases}" if self.kept == cases > 1 else f"{share} % of {cases}"
+        interval = f"{100 * CONFIDENCE:g} % interval {low} to {high} %"
+        return f"{plan} {limit} mm in {of} {self.cases} ({interval})"
 
 
 @dataclass(frozen=True)
 class Found:
-    """steps : of the last search, by `numbers` of cases. best : None if all candidates do not keep the limit.
-    samples : of each round; none if there is one load case. order : the plans with 0, 1, … fasteners set.
+    """The outcome of all rounds.
+
+    steps : of the last search, in the load cases `numbers`. best : None if not even all candidates keep the
+    limit. samples : one per round; none if there is one load case. order : the plans with 0, 1, … fasteners
+    set, up to the best.
     """
 
     steps: list[Step]
@@ -135,17 +159,14 @@ class Found:
     order: list[Step]
 
 
-def decided(
-    search: Search, own: Plan, goal: Goal, cases: Cases, again: Callable[[Sample, int], None]
-) -> Found:
-    """Search after search, each with a sample, until one is enough.
-
-    again : told of a sample that is not, and of how many cases choose the next plan.
+def search_in_rounds(search: Search, current: Plan, goal: Goal, cases: Cases) -> Found:
+    """Search, and let fresh cases decide, until a plan passes or no round is left. current : the scene's own
+    plan, for comparison.
     """
-    used, chosen, samples = cases.choosing, cases.choosing, list[Sample]()
+    used, choosing, samples = cases.choosing, cases.choosing, list[Sample]()
     while True:
-        now = search.among(cases.numbers[:chosen], goal.allowed(chosen))
-        steps, best = searched(now, own, goal)
+        now = search.among(cases.numbers[:choosing], goal.allowed(choosing))
+        steps, best = search_once(now, current, goal)
         enough = more_may_help = goal.limit_mm is None or best.gap_mm <= goal.limit_mm
         if len(cases.numbers) == 1:
             break
@@ -156,26 +177,29 @@ def decided(
         enough = goal.limit_mm is None or sample.step.gap_mm <= goal.limit_mm
         if enough or cases.table or not more_may_help or len(samples) == ROUNDS:
             break
-        again(sample, 2 * chosen)
-        chosen *= 2
-        used = max(used + count, chosen)
+        choosing *= 2
+        more = f"that is too few. The search goes on with {choosing} cases"
+        search.reporter.say(f"{sample.sentence(goal)}: {more}")
+        used = max(used + count, choosing)
     none = best is steps[0] and not enough
     order = [] if none else [best, *now.removal(best, {})][::-1]
-    return Found(steps, cases.numbers[:chosen], None if none else best, samples, order)
+    return Found(steps, cases.numbers[:choosing], None if none else best, samples, order)
 
 
-def searched(search: Search, own: Plan, goal: Goal) -> tuple[list[Step], Step]:
-    """All candidates, the scene's own plan, removal and exchange, uniform plans of as many; and the best."""
+def search_once(search: Search, current: Plan, goal: Goal) -> tuple[list[Step], Step]:
+    """All plans kept, and the best: all candidates, the scene's own plan, removal and exchange, and uniform
+    plans with as many fasteners as the best.
+    """
     steps = [search.whole(search.candidates, "all candidates")]
-    if own != search.candidates:
-        steps.append(search.whole(own, "own"))
-    best, before = steps[0], Values()
+    if current != search.candidates:
+        steps.append(search.whole(current, "own"))
+    best, values = steps[0], Values()
     if goal.count is None and best.gap_mm <= search.limit_mm:
         best, way = search.fewest(best)
         steps += way
     elif goal.count is not None and comb(len(search.candidates), goal.count) <= PLANS:
         steps.append(best := search.best_of_all(best, goal.count))
     elif goal.count is not None:
-        steps += islice(search.removal(best, before), len(best.plan) - goal.count - 1)
-        steps.append(best := search.fewer(steps[-1], before, every=goal.count <= FEW)[0])
+        steps += islice(search.removal(best, values), len(best.plan) - goal.count - 1)
+        steps.append(best := search.fewer(steps[-1], values, every=goal.count <= FEW)[0])
     return [*steps, *search.wholes(search.even(len(best.plan)), "uniform")], best

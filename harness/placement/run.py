@@ -1,226 +1,233 @@
-"""Runs a search for the best plan of fasteners and writes it: as a scene, as tables, and as a report.
+"""Searches for the best plan of fasteners and writes it: as a scene, as tables, and as a report.
 
-The plan found, and the scene's own, are then series of load cases like any other, in DIRECTORY/plan and
+The plan found and the scene's own plan are then solved as series of load cases, in DIRECTORY/plan and
 DIRECTORY/own, on the scenes as a user would read them.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict, replace
-from math import floor, log10
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from rich.console import Console
 
 from harness.measurement.scheduler import workers
-from harness.placement.answer_journal import PLANS, Asked
-from harness.placement.candidates import Movable, Plan
-from harness.placement.fresh_cases import CONFIDENCE, Cases, Found, Goal, Sample, decided
-from harness.placement.search import Search, Step
+from harness.measurement.solver_descriptions import described
+from harness.placement.answer_journal import PLANS, AnswerJournal
+from harness.placement.candidates import MovableFasteners, Place, Plan
+from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
+from harness.placement.search import Search
+from harness.placement.search_record import identity_of, record_of, sentence_on
 from harness.placement.session import THREADS, Study
+from harness.planning.form_choice import chosen_form
 from harness.results import records
-from harness.results.provenance import installed_version, provenance
+from harness.results.atomic_output import refuse_inputs
+from harness.scene.allowed_gap import refuse_unusable
 from harness.scene.scene_file import MOVED, edited, with_fasteners, with_gaps
+from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
-from harness.terminal import DONE, GAP_EXCEEDED
-from harness.terminal.console import ConsoleReporter
+from harness.terminal.console import console_of
 from harness.verification.judge import LIMIT_MM
-from problems.build import prepared
+from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
-from problems.errors import InputError
-from problems.forms.assembly import Matrix
-from problems.load_cases import LoadCases
+from problems.errors import Fault, InputError
+from problems.load_cases import Listed, LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
 from problems.model.scene import JointScene, Scene
+from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene, scene_of
-from problems.storage import digest
-from report.document.numbers import counted, position
 
 RECORD = "place.json"
 SERIES = ("own", "plan")
 OUTPUTS = (RECORD, PLANS, *(f"{name}.{kind}" for name in SERIES for kind in ("toml", "csv")))
 SERIES_TOLERANCE = 1e-11
+HELD_BACK = "Every second row is held back: it does not choose the plan, but says what it keeps"
 
-CasesOf = Callable[[Scene], LoadCases]
 
+@dataclass(frozen=True)
+class Placement:
+    """The outcome of `place`.
 
-def run(
-    source: str,
-    movable: Movable,
-    candidates: Plan,
-    goal: Goal,
-    cases_of: CasesOf,
-    study: Study,
-    facts: dict[str, Any],
-    directory: Path,
-    console: Console,
-    scheduler: str | None,
-) -> int:
-    """Search, and write DIRECTORY. Returns 0, or 4 if no plan keeps the limit.
-
-    facts : of the solver, for the series. The same command resumes what was interrupted. Raises InputError.
+    Parameters
+    ----------
+    plan : tuple of (float, float), optional
+        Places (x, y) of the fasteners found, mm, sorted; None if not even all candidates keep the limit.
+    order : tuple of (float, float)
+        The same places in the order in which to set them.
+    passed : bool
+        Whether the plan is shown to keep the limit; True if none was asked for.
+    sentence : str
+        The outcome in words.
+    report : Path
+        The report, in Markdown.
     """
-    cases = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
-    nodes = prepared(study.bare, form=study.form).assembly.contact_nodes
-    assert nodes is not None  # of a joint
 
+    plan: Plan | None
+    order: tuple[Place, ...]
+    passed: bool
+    sentence: str
+    report: Path
+
+
+def place(
+    scene: str | Path,
+    out: str | Path,
+    *,
+    candidates: str | Path | None = None,
+    allow_gap_mm: float | None = None,
+    count: int | None = None,
+    share: float | None = None,
+    cases: GapCases = DEFAULT,
+    scheduler: str | None = None,
+    reporter: Reporter = SILENT,
+) -> Placement:
+    """Find the fewest fasteners that keep a gap in most load cases, or the best `count` of them.
+
+    Parameters
+    ----------
+    scene : str or Path
+        Name of a scene, or the path of its file, with fasteners of one preload.
+    out : str or Path
+        Directory for the plan (plan.toml, plan.csv), the report and the answers so far: the same call
+        continues an interrupted search.
+    candidates : str or Path, optional
+        The holes: rows x columns, as "4x32", or a CSV with columns x and y, mm; by default the places of the
+        scene's fasteners.
+    allow_gap_mm : float, optional
+        The largest gap allowed, mm.
+    count : int, optional
+        Number of fasteners, to find the best plan of that number instead of the fewest.
+    share : float, optional
+        Share of the load cases that must keep the gap, 0 to 1; by default 0.95, of a single case 1.
+    cases : GapCases, optional
+        The load cases; by default 100 with random gaps, or the scene alone if its gaps are not random.
+    scheduler : str, optional
+        Dask workers: local:N, or the address of a scheduler; by default this process.
+    reporter : Reporter, optional
+        Is told each plan that is kept; silent by default.
+
+    Returns
+    -------
+    Placement
+        The plan, its order, and whether fresh load cases show that it keeps the gap.
+
+    Raises
+    ------
+    InputError
+        If an input is wrong, or `out` holds another search.
+
+    Examples
+    --------
+    >>> from rivetbench import place
+    >>> found = place("examples/three-fasteners.toml", "results/two", count=2)
+    >>> len(found.plan)
+    2
+    """
+    source, directory = str(scene), Path(out)
+    refuse_unusable(allow_gap_mm)
+    inputs = [Path(file) for file in (scene, candidates, cases.around, cases.gaps) if file]
+    refuse_inputs([directory / name for name in OUTPUTS], inputs)
+    movable = MovableFasteners.of(read_scene(source))
+    holes = movable.candidates(None if candidates is None else str(candidates))
+    single = cases == DEFAULT and not any(gap.random for gap in movable.bare.effects_of(InitialGap))
+    faults = cases.faults()
+    if allow_gap_mm is None and count is None:
+        faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
+    if count is not None and not 0 < count <= len(holes):
+        faults.append(Fault("--count", "N", count, f"at most {len(holes)}, the candidates"))
+    if share is not None and not 0 < share <= 1:
+        faults.append(Fault("--share", "share", share, "above 0, at most 1"))
+    if faults:
+        raise InputError(faults)
+    (newton,) = described([("newton", {})], None, "--solver", reporter)
+    number = 1 if single else cases.count or RANDOM
+    form = chosen_form(movable.bare, newton.forms, None, number * len(holes)).form
+
+    def cases_of(scene: Scene) -> LoadCases:
+        return Listed((load_case(scene, form),)) if single else cases.of(scene, form)
+
+    study = Study(movable.bare, movable.fastener, cases_of(movable.bare), form)
+    for sentence in (*study.bare.unusual, *study.cases.notes):
+        reporter.say(sentence)
+    share = share if share is not None else 1.0 if study.cases.count == 1 else 0.95
+    goal = Goal(allow_gap_mm, share, count)
+    order = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
     law = _other_gaps(study.bare, study.cases)
-    kinds = MOVED if law is None else (*MOVED, "initial_gap")
-
-    def text_of(plan: Plan) -> str:
-        def change(document: Any) -> None:
-            with_fasteners(plan)(document)
-            if law is not None:
-                with_gaps(law)(document)
-
-        return edited(source, directory, change, kinds)
-
-    text_of(movable.own)  # refused now rather than after the search
-    identity = _identity(study, movable.own, candidates, goal) | facts
+    text_of = partial(_scene_text, source, directory, law)
+    current = text_of(movable.current)  # refused now rather than after the search
+    facts = {"solver_version": newton.version, "solver_code": newton.code}
+    identity = identity_of(study, movable.current, holes, goal) | facts
     there = [name for name in (*OUTPUTS, *SERIES) if (directory / name).exists()]
     if there and PLANS not in there:
         allowed = f"has {there[0]} of another command: name another directory"
         raise InputError.one("--out", "directory", str(directory), allowed)
-    if cases.table:
-        console.print("Every second row is held back: it does not choose the plan, but says what it keeps.")
+    if order.table:
+        reporter.say(HELD_BACK)
+    nodes = prepared(study.bare, form=form).assembly.contact_nodes
+    assert nodes is not None  # of a joint
+    console = console_of(reporter)
     with records.locked(directory, (), other=records.MEASUREMENTS):
-        scene_of(tomllib.loads(text_of(movable.own)), str(directory / "own.toml"))  # as is refused at the end
+        scene_of(tomllib.loads(current), str(directory / "own.toml"))  # as is refused at the end
         pool = workers(scheduler, console) if scheduler else nullcontext()
-        reporter = ConsoleReporter(console, plain=True)
-        with pool as where, reporter.step("search"):
-            ask = Asked(study, directory / PLANS, identity, where)
-            search = Search(ask, study.bare, nodes, candidates, 0, 0, goal.limit_mm or 0.0, reporter)
-
-            def again(sample: Sample, more: int) -> None:
-                words = f"{_kept(goal, sample)}: that is too few. The search goes on with {more} cases."
-                console.print(words, style="yellow", soft_wrap=True)
-
-            found = decided(search, movable.own, goal, cases, again)
-        plans = {"own": movable.own} | ({"plan": found.best.plan} if found.best else {})
+        with pool as executor, reporter.step("search"):
+            journal = AnswerJournal(study, directory / PLANS, identity, executor)
+            search = Search(journal, study.bare, nodes, holes, 0, 0, goal.limit_mm or 0.0, reporter)
+            result = search_in_rounds(search, movable.current, goal, order)
+        plans = {"own": movable.current} | ({"plan": result.best.plan} if result.best else {})
         for name, plan in plans.items():
-            path = directory / f"{name}.toml"
-            records.replace_text(path, text_of(plan))
-            scene = read_scene(str(path))
-            if law is not None and law.points is not None:  # a scene has a scan, or random gaps around it
-                assert isinstance(scene, JointScene)
-                scene = replace(scene, effects=(*study.bare.effects, *scene.effects_of(Fasteners)))
-            made = cases_of(scene)
-            if found.samples and isinstance(made, RandomGaps):  # those that decided, too
-                made = replace(made, count=found.samples[-1].numbers[-1] + 1)
-            job = Job(scene, made, "newton", study.form, SERIES_TOLERANCE, LIMIT_MM, 0, THREADS)
-            run_series(job, facts, directory / name, console)
+            records.replace_text(directory / f"{name}.toml", text_of(plan))
             pd.DataFrame(plan, columns=["x", "y"]).to_csv(directory / f"{name}.csv", index=False)
-        words, code = _said(found, goal, nodes)
-        record = _record(study, movable, candidates, goal, found, nodes)
+            moved, made = _written_scene(directory / f"{name}.toml", study, law, cases_of, result)
+            job = Job(moved, made, "newton", form, SERIES_TOLERANCE, LIMIT_MM, 0, THREADS)
+            run_series(job, facts, directory / name, console)
+        words, passed = sentence_on(result, goal, nodes)
+        record = record_of(study, movable.current, holes, goal, result, nodes)
         records.replace_object(directory / RECORD, record | {"said": words})
         from report.writers.place_report import write  # slow to import: not before the search
 
-        console.print(f"Report: {write(directory)}")
-        console.print(words, style="green" if code == DONE else "red", soft_wrap=True)
-        return code
+        steps = zip(result.order[1:], result.order, strict=False)
+        added = tuple(next(iter(set(step.plan) - set(earlier.plan))) for step, earlier in steps)
+        return Placement(plans.get("plan"), added, passed, words, write(directory))
+
+
+def _scene_text(source: str, directory: Path, law: RandomGaps | None, plan: Plan) -> str:
+    """The scene's file with the fasteners of a plan, and with the random gaps of `law` if there are any."""
+
+    def change(document: Any) -> None:
+        with_fasteners(plan)(document)
+        if law is not None:
+            with_gaps(law)(document)
+
+    return edited(source, directory, change, MOVED if law is None else (*MOVED, "initial_gap"))
+
+
+def _written_scene(
+    path: Path, study: Study, law: RandomGaps | None, cases_of: Callable[[Scene], LoadCases], result: Found
+) -> tuple[Scene, LoadCases]:
+    """The scene of a file that was written, and its load cases: those that decided, too."""
+    scene = read_scene(str(path))
+    if law is not None and law.points is not None:  # a scene has a scan, or random gaps around it
+        assert isinstance(scene, JointScene)
+        scene = replace(scene, effects=(*study.bare.effects, *scene.effects_of(Fasteners)))
+    cases = cases_of(scene)
+    if result.samples and isinstance(cases, RandomGaps):
+        cases = replace(cases, count=result.samples[-1].numbers[-1] + 1)
+    return scene, cases
 
 
 def _other_gaps(bare: JointScene, cases: LoadCases) -> RandomGaps | None:
-    """The random gaps, if the scene's file says something else of them than these cases."""
+    """The random gaps of the cases, unless the scene's file has the same."""
     if not isinstance(cases, RandomGaps):
         return None
     but = {"random": {"seed"}}
-    there = [each.model_dump(exclude=but) for each in bare.effects_of(InitialGap)]
-    same = there == [cases.field.model_dump(exclude=but)]
+    in_file = [effect.model_dump(exclude=but) for effect in bare.effects_of(InitialGap)]
+    same = in_file == [cases.field.model_dump(exclude=but)]
     return None if same and cases.points is None else cases
-
-
-def _identity(study: Study, own: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
-    """All that decides what is written, so that one directory holds one search."""
-    holes = {"candidates": candidates, "the scene's fasteners": own}
-    return {
-        **asdict(goal),
-        **{name: f"{counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
-        "scene_key": study.bare.key,
-        "fastener": study.fastener.model_dump(mode="json", include={"preload", "between"}),
-        "cases_key": study.cases.key,
-        "cases": study.cases.count,
-        "form": study.form,
-        "rivetbench_version": installed_version("rivetbench"),
-    }
-
-
-def _record(
-    study: Study, movable: Movable, candidates: Plan, goal: Goal, found: Found, nodes: Matrix
-) -> dict[str, Any]:
-    def step(each: Step, numbers: Sequence[int] = found.numbers) -> dict[str, Any]:
-        limit = float("inf") if goal.limit_mm is None else goal.limit_mm
-        return {
-            "moved": each.moved,
-            "fasteners": len(each.plan),
-            "gap_mm": each.gap_mm,
-            "failing": [numbers[k] for k, gap in enumerate(each.outcome.largest) if gap > limit],
-            "worst_case": numbers[each.worst],
-            "worst_at": nodes[each.outcome.contact[each.worst]].tolist(),
-            "plan": each.plan,
-        }
-
-    return {
-        "scene": study.bare.name,
-        "title": study.bare.title,
-        "cases": len(found.numbers),
-        "chosen_by_share": 1 - goal.allowed(len(found.numbers)) / len(found.numbers),
-        "preload": study.fastener.preload,
-        **asdict(goal),
-        "confidence": CONFIDENCE,
-        "samples": [
-            step(sample.step, sample.numbers)
-            | {"cases": len(sample.numbers), "numbers": list(sample.numbers)}
-            | {"kept": sample.kept, "interval": sample.interval}
-            for sample in found.samples
-        ],
-        "candidates": candidates,
-        "own": movable.own,
-        "steps": [step(each) for each in found.steps],
-        "best": None if found.best is None else step(found.best),
-        "order": [step(each) for each in found.order],
-        **provenance(),
-    }
-
-
-def _kept(goal: Goal, sample: Sample, which: str = "") -> str:
-    """3 fasteners keep 0.12 mm in 96.7 % of 300 fresh cases (95 % interval 94.0 to 98.4 %)"""
-    step, cases = sample.step, len(sample.numbers)
-    plan = f"{which}{counted(len(step.plan), 'fastener')} {'keeps' if len(step.plan) == 1 else 'keep'}"
-    digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
-    share, low, high = (f"{100 * value:.{digits}f}" for value in (sample.kept / cases, *sample.interval))
-    limit = f"{step.gap_mm:.3g}" if goal.limit_mm is None else f"{goal.limit_mm:g}"
-    of = f"all {cases}" if sample.kept == cases > 1 else f"{share} % of {cases}"
-    interval = f"{100 * CONFIDENCE:g} % interval {low} to {high} %"
-    return f"{plan} {limit} mm in {of} {sample.what} ({interval})"
-
-
-def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
-    """The outcome in words, and the exit code."""
-    which, count = "all of the " if found.best is None else "", len((found.best or found.steps[0]).plan)
-    sample = found.samples[-1] if found.samples else None
-    step = sample.step if sample else found.best or found.steps[0]
-    if sample:
-        left = _kept(goal, sample, which)
-    else:
-        leave = "leaves" if count == 1 else "leave"
-        left = f"{which}{counted(count, 'fastener')} {leave} {step.gap_mm:.3g} mm in the one load case"
-    if goal.limit_mm is None:
-        return f"{left}, proven.", DONE
-    if step.gap_mm <= goal.limit_mm:
-        return f"PASS: {left}, proven.", DONE
-    worst = step.worst if sample is None else sample.numbers[step.worst]
-    place = position(*nodes[step.outcome.contact[step.worst]])
-    if sample:
-        share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
-        left += f"; in {share} it is {step.gap_mm:.3g} mm"
-    more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
-    return f"FAIL: {left}, {more}; case {worst} is the worst, at {place}.", GAP_EXCEEDED

@@ -1,23 +1,24 @@
-"""The fewest fasteners that keep a gap, or the best of a number: removal one by one, then exchange.
+"""The fewest fasteners that keep a limit on the gap, or the best plan of a given number of them.
 
-The gap G(S) of a plan S is the least that all load cases but the worst keep, as many as may fail of K (see
-fresh_cases.py). It is not monotone: a fastener may open a gap elsewhere. Plans are compared by
+The gap G(S) of a plan S is the smallest limit that it keeps in all of its K load cases but those that may
+fail (fresh_cases.py). G is not monotone: one more fastener may open a gap elsewhere. Plans are compared by
 
     φ(S) = (max(G, limit), mean over the cases of (Σ y⁸ / m)^⅛),
 
-estimated on the cases that decide about G: twice the number that may fail and 8 more, the worst of the plan
-before. Their G is never above that of all. Each plan that is kept is then solved in all cases, and proven.
+y the m gaps of a case. φ is estimated on the worst cases of the plan before: twice the number that may fail,
+and 8 more. The G of these cases is never above that of all. Each plan that is kept is then solved in all
+cases, and proven.
 
-Removal takes out the fastener without which φ is least, or an eighth of the plan, those without which it is
-least one by one, no two next to each other, as long as the limit is kept. What removing one costs grows, as
-a rule, with each other that is gone, so that values of earlier steps are tried in their order until none can
-be less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 1978).
+Removal deletes the fastener whose loss costs least: without it, φ is least. While the limit holds, it deletes
+an eighth of the plan per step, never two neighbours. As a rule, the cost of a removal grows with the number
+of fasteners already deleted. So the values of earlier steps are renewed in their order, until no other can be
+less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 1978).
 
-Exchange moves a fastener to one of the free holes next to where the gap is too large: one of the nearest, or
-of those that are needed least. The best move is made as long as it makes φ less. Of the plan without the
-fastener that is needed least and uniform ones of as many, it starts from the one of least G. Where there are
-few plans of a number of fasteners, all of them are compared instead. Where a number of FEW or less is asked
-for, it starts from each.
+Exchange moves one fastener to a free hole next to a place where the gap is too large. It tries the fasteners
+nearest to that hole and those whose loss costs least, makes the best move, and goes on while φ falls. It
+starts from the plan of least G among the uniform ones of as many fasteners and the plan after a removal; from
+each of them if FEW fasteners or less are asked for. If there are at most PLANS plans of a number of
+fasteners, all of them are compared instead.
 """
 
 from __future__ import annotations
@@ -43,22 +44,22 @@ Ask: TypeAlias = Callable[[Sequence[Question]], list[list[Outcome]]]
 Value: TypeAlias = tuple[float, float]
 Values: TypeAlias = dict[Place, Value]
 
-TOGETHER, ESTIMATED = 50, 14  # cases of two questions, at most; of estimates
-MORE_CASES = 8  # than twice those that may fail, in an estimate: of fewer, a plan's worst may be new ones
-AT_ONCE = 8  # plans that are tried together
+TOGETHER, ESTIMATED = 50, 14  # most cases in two questions, proven and estimated
+MORE_CASES = 8  # of an estimate, beyond twice those that may fail: with fewer, a plan's worst may be others
+AT_ONCE = 8  # plans estimated together
 NONE = (0.0, 0.0)  # less than any φ
-HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners needed least
-SHARE_AT_ONCE = 8  # a plan's share that is taken out at once, as long as that keeps the limit
-NEXT = 3  # a fastener and those next to it
-FEW = 3  # fasteners, for whose number exchange starts from every plan
-PLANS = 300  # that are all compared; after a removal half as many
-FURTHER = 1.25  # times what is enough: how far removal goes on
+HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners that cost least
+SHARE_AT_ONCE = 8  # 1/8 of a plan is deleted per step, while the limit holds
+NEXT = 3  # a fastener and its neighbours
+FEW = 3  # up to so many fasteners, exchange starts from every plan
+PLANS = 300  # up to so many plans of a number, all are compared; after a removal half as many
+FURTHER = 1.25  # times the limit: removal goes on up to this gap
 DIGITS = 6  # of mm: values closer than a nanometre are equal, whatever the rounding
 
 
 @dataclass(frozen=True)
 class Step:
-    """A plan, its gap G, proven, mm, and its outcome in each case. moved : how it came about."""
+    """A plan with its proven gap G, mm, and its outcome in each case. moved : how it came about."""
 
     plan: Plan
     gap_mm: float
@@ -77,8 +78,11 @@ class Step:
 
 @dataclass
 class Search:
-    """ask : answers questions. bare : the scene without fasteners. contacts : (m, 2) their places, mm.
-    cases : K. allowed : how many may fail. reporter : is told each plan that is kept.
+    """Searches among plans from a set of candidate holes.
+
+    ask : answers questions. bare : the scene without fasteners. contacts : their places (m, 2), mm. cases :
+    K, the number of load cases. allowed : how many of them may fail. reporter : is told each plan that is
+    kept.
     """
 
     ask: Ask
@@ -92,7 +96,7 @@ class Search:
     proven: Iterator[int] = field(default_factory=lambda: itertools.count(1))
 
     def gap(self, outcome: Outcome) -> float:
-        """G, mm, of all cases, or of those in the outcome."""
+        """G, mm, in the cases of the outcome."""
         return sorted(outcome.largest, reverse=True)[self.allowed]
 
     def among(self, numbers: Sequence[int], allowed: int) -> Search:
@@ -104,121 +108,131 @@ class Search:
         return replace(self, ask=ask, cases=len(numbers), allowed=allowed)
 
     def whole(self, plan: Plan, moved: str = "") -> Step:
-        """A plan in all cases, proven."""
+        """A plan solved in all cases, and proven."""
         return self.wholes([plan], moved)[0]
 
     def wholes(self, plans: Sequence[Plan], moved: str = "") -> list[Step]:
-        found = zip(plans, self._left(plans, range(self.cases), TOGETHER), strict=True)
-        steps = [Step(plan, self.gap(outcome), outcome, moved) for plan, outcome in found]
+        outcomes = self._outcomes(plans, range(self.cases), TOGETHER)
+        steps = [
+            Step(p, self.gap(outcome), outcome, moved) for p, outcome in zip(plans, outcomes, strict=True)
+        ]
         for step in steps:
             proven = counted(next(self.proven), "plan")
             words = f"{counted(len(step.plan), 'fastener')}, {step.moved}: {step.gap_mm:.3g} mm"
             self.reporter.progress(f"{words} ({proven} proven)")
         return steps
 
-    def _left(
+    def _outcomes(
         self, plans: Sequence[Plan], cases: Sequence[int], most: int, base: Plan | None = None
     ) -> list[Outcome]:
-        """Of each plan, asked in parts of the cases, which share no solution: in pairs, for two workers."""
+        """The outcome of each plan. The cases are asked in an even number of parts, for two workers; most :
+        cases in two parts.
+        """
         parts = [tuple(part.tolist()) for part in np.array_split(cases, 2 * -(-len(cases) // most))]
-        found = self.ask([Question(tuple(plans), part, base) for part in parts if part])
-        names = [each.name for each in fields(Outcome)]
+        answers = self.ask([Question(tuple(plans), part, base) for part in parts if part])
+        names = [field.name for field in fields(Outcome)]
         return [
-            Outcome(*(tuple(v for part in each for v in getattr(part, name)) for name in names))
-            for each in zip(*found, strict=True)
+            Outcome(*(tuple(v for part in of_plan for v in getattr(part, name)) for name in names))
+            for of_plan in zip(*answers, strict=True)
         ]
 
     def even(self, count: int) -> list[Plan]:
-        """The holes nearest to uniform patterns of so many fasteners."""
+        """Plans of the holes nearest to uniform patterns of `count` fasteners."""
         return list(dict.fromkeys(onto(plan, self.candidates) for plan in uniform_plans(self.bare, count)))
 
     def fewest(self, start: Step) -> tuple[Step, list[Step]]:
-        """The smallest plan found that keeps the limit, as `start`, all candidates, does; all on the way."""
-        best, steps, before = start, list[Step](), Values()
+        """The smallest plan found that keeps the limit, and all steps to it. start : all candidates, which
+        keep it.
+        """
+        best, steps, earlier = start, list[Step](), Values()
         while (count := len(best.plan) // SHARE_AT_ONCE) > 1:
-            steps.append(step := self._without_least(best, before, count))
+            steps.append(step := self._without_least(best, earlier, count))
             if step.gap_mm > self.limit_mm:
                 break
             best = step
-        known = dict(before)
-        for step in self.removal(best, before):
+        values = dict(earlier)
+        for step in self.removal(best, earlier):
             steps.append(step)
             if step.gap_mm <= self.limit_mm:
-                best, known = step, dict(before)
+                best, values = step, dict(earlier)
             elif step.gap_mm > FURTHER * self.limit_mm:
                 break
         while best.plan:
-            fewer, known = self.fewer(best, known)
+            fewer, values = self.fewer(best, values)
             if fewer.gap_mm > self.limit_mm:
                 break
             steps.append(best := fewer)
         return best, steps
 
-    def fewer(self, step: Step, before: Values, every: bool = False) -> tuple[Step, Values]:
-        """The best that exchange makes of plans with one fastener less, or of all of them, if they are few;
-        and the values on its way. every : whether it starts from all these plans, not from the best alone.
+    def fewer(self, step: Step, earlier: Values, every: bool = False) -> tuple[Step, Values]:
+        """The best plan found with one fastener less, and the values on the way to it.
+
+        Exchange starts from the best plan of that number, or from every one of them; if there are few plans
+        of that number, all are compared.
         """
         if comb(len(self.candidates), len(step.plan) - 1) <= PLANS // 2:
             return self.best_of_all(step, len(step.plan) - 1), {}
         starts: dict[Plan, Values] = {plan: {} for plan in self.even(len(step.plan) - 1)}
-        starts[without(step.plan, self._least(step, before, 1)[0])] = before
-        found = sorted(self.wholes(list(starts), "exchange"), key=Step.order)
-        tried = [self.exchanged(start, starts[start.plan]) for start in (found if every else found[:1])]
-        return min(tried, key=Step.order), starts[found[0].plan]
+        starts[without(step.plan, self._least(step, earlier, 1)[0])] = earlier
+        ordered = sorted(self.wholes(list(starts), "exchange"), key=Step.order)
+        tried = [self.exchanged(start, starts[start.plan]) for start in (ordered if every else ordered[:1])]
+        return min(tried, key=Step.order), starts[ordered[0].plan]
 
     def best_of_all(self, step: Step, count: int) -> Step:
-        """The plan of least G of all with so many fasteners. step : the base of the first estimates.
+        """The plan of least G among all plans of `count` fasteners. step : the base of the first estimates.
 
-        Estimates are never above G: plans are solved in the order of theirs, until no other can have less.
+        Estimates are never above G: plans are solved in the order of their estimates, until no other can have
+        a smaller G.
         """
         plans = list(combinations(self.candidates, count))
-        left = dict(zip(plans, self._values(step, plans), strict=True))
+        values = dict(zip(plans, self._values(step, plans), strict=True))
         solved: list[Step] = []
-        while left:
-            del left[plan := min(left, key=lambda each: (left[each], each))]
+        while values:
+            del values[plan := min(values, key=lambda plan: (values[plan], plan))]
             solved.append(self.whole(plan, "exchange"))
             least = min(step.gap_mm for step in solved)
-            left = {plan: value for plan, value in left.items() if value[0] < max(least, self.limit_mm)}
-            renewed = self._values(solved[-1], list(left))
-            left = {plan: max(pair) for plan, *pair in zip(left, left.values(), renewed, strict=True)}
+            values = {plan: value for plan, value in values.items() if value[0] < max(least, self.limit_mm)}
+            renewed = self._values(solved[-1], list(values))
+            values = {plan: max(pair) for plan, *pair in zip(values, values.values(), renewed, strict=True)}
         return min(solved, key=Step.order)
 
-    def removal(self, step: Step, before: Values) -> Iterator[Step]:
-        """The plans with one fastener less each. before : values of earlier steps."""
+    def removal(self, step: Step, earlier: Values) -> Iterator[Step]:
+        """Plans with one, two, … fasteners less. earlier : values of earlier steps, renewed."""
         while step.plan:
-            yield (step := self._without_least(step, before, 1))
+            yield (step := self._without_least(step, earlier, 1))
 
-    def _without_least(self, step: Step, before: Values, count: int) -> Step:
-        """Without the fasteners that are needed least; of those next to each other, without one."""
+    def _without_least(self, step: Step, earlier: Values, count: int) -> Step:
+        """The plan without the `count` fasteners whose loss costs least; of neighbours, one alone goes."""
         gone: list[Place] = []
-        for place in self._least(step, before, count):
+        for place in self._least(step, earlier, count):
             if not set(nearest(step.plan, place, NEXT)).intersection(gone):
                 gone.append(place)
         return self.whole(tuple(place for place in step.plan if place not in gone), "removal")
 
-    def _least(self, step: Step, before: Values, count: int) -> list[Place]:
-        """The `count` fasteners without one of which φ is least. before : earlier values, renewed."""
+    def _least(self, step: Step, earlier: Values, count: int) -> list[Place]:
+        """The `count` fasteners whose loss costs least. earlier : φ of earlier steps, renewed."""
         fresh: Values = {}
-        waiting = sorted(step.plan, key=lambda place: (before.get(place, NONE), place))
+        waiting = sorted(step.plan, key=lambda place: (earlier.get(place, NONE), place))
         while waiting:
-            if len(fresh) >= count and sorted(fresh.values())[count - 1] <= before.get(waiting[0], NONE):
+            if len(fresh) >= count and sorted(fresh.values())[count - 1] <= earlier.get(waiting[0], NONE):
                 break
             some, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
-            values = self._values(step, [without(step.plan, each) for each in some])
+            values = self._values(step, [without(step.plan, place) for place in some])
             fresh |= dict(zip(some, values, strict=True))
-        before |= fresh
+        earlier |= fresh
         return sorted(fresh, key=lambda place: (fresh[place], place))[:count]
 
-    def exchanged(self, step: Step, before: Values) -> Step:
-        """The plan after the best moves, until it keeps the limit or no move makes φ less. The worst cases of
-        a move that was none decide about the next ones, too.
+    def exchanged(self, step: Step, earlier: Values) -> Step:
+        """The plan after the best moves, until it keeps the limit or no move makes φ less.
+
+        If a move turns out not to lower G, its worst cases also decide about the next moves.
         """
         cases = self._deciding(step)
         while step.gap_mm > self.limit_mm:
-            moves = self._moves(step, before)
-            (own, *values) = self._values(step, [step.plan, *moves], cases)
+            moves = self._moves(step, earlier)
+            (now, *values) = self._values(step, [step.plan, *moves], cases)
             best = min(range(len(moves)), key=lambda k: (values[k], moves[k]), default=None)
-            if best is None or values[best] >= own:
+            if best is None or values[best] >= now:
                 break
             after = self.whole(moves[best], "exchange")
             if after.gap_mm < step.gap_mm:
@@ -229,12 +243,12 @@ class Search:
                 cases = tuple(sorted({*cases, *more}))
         return step
 
-    def _moves(self, step: Step, before: Values) -> list[Plan]:
+    def _moves(self, step: Step, earlier: Values) -> list[Plan]:
         """Plans with one fastener moved to a free hole."""
         free = [place for place in self.candidates if place not in step.plan]
         if not (free and step.plan):
             return []
-        least = self._least(step, before, LEAST)
+        least = self._least(step, earlier, LEAST)
         places = [self.contacts[step.outcome.contact[k]] for k in self._deciding(step)]
         holes = Counter(nearest(free, place, 1)[0] for place in places)
         moves = {
@@ -246,16 +260,19 @@ class Search:
         return list(moves)
 
     def _deciding(self, step: Step) -> tuple[int, ...]:
-        """The worst cases of a plan, in order of their number."""
+        """The worst cases of a plan, by their numbers."""
         worst = sorted(range(self.cases), key=lambda k: (-round(step.outcome.largest[k], DIGITS), k))
         return tuple(sorted(worst[: 2 * self.allowed + MORE_CASES]))
 
     def _values(self, step: Step, plans: Sequence[Plan], cases: tuple[int, ...] = ()) -> list[Value]:
-        """φ of other plans, estimated. cases : those that decide, unless given."""
-        found = self._left(plans, cases or self._deciding(step), ESTIMATED, step.plan)
+        """φ of other plans, estimated in `cases`, by default the worst ones of the step."""
+        outcomes = self._outcomes(plans, cases or self._deciding(step), ESTIMATED, step.plan)
         return [
-            (round(max(self.gap(each), self.limit_mm), DIGITS), round(float(np.mean(each.mean)), DIGITS))
-            for each in found
+            (
+                round(max(self.gap(outcome), self.limit_mm), DIGITS),
+                round(float(np.mean(outcome.mean)), DIGITS),
+            )
+            for outcome in outcomes
         ]
 
 
@@ -264,7 +281,7 @@ def without(plan: Plan, gone: Place) -> Plan:
 
 
 def onto(plan: Plan, candidates: Plan) -> Plan:
-    """Each of the plan's fasteners in the nearest hole that is free."""
+    """The plan with each fastener moved to the nearest free hole."""
     free = list(candidates)
     for place in plan:
         free.remove(nearest(free, place, 1)[0])
@@ -272,5 +289,5 @@ def onto(plan: Plan, candidates: Plan) -> Plan:
 
 
 def nearest(places: Sequence[Place], to: Place | Matrix, count: int) -> list[Place]:
-    """Those of the places that are nearest, the nearest first."""
+    """The `count` places nearest to a point, the nearest first."""
     return sorted(places, key=lambda place: (dist(place, to), place))[:count]

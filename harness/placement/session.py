@@ -1,11 +1,11 @@
-"""What a plan of fasteners leaves open: the largest gap of each load case, in one process.
+"""The largest gap that plans of fasteners leave in each load case, computed in one process.
 
 A fastener at z adds f_z to the forces f₀ of the scene without any, and u_z = AᵀK⁻¹f_z to its overlap p₀:
 
     f = f₀ + Σ f_z,   p = p₀ + Σ u_z,
 
-so that a plan costs no more than its contact problems. Each is solved by active-set Newton from the answer of
-its load case to another plan, which most contacts share.
+so that a plan costs no more than its contact problems. Active-set Newton solves each from the answer of
+another plan in the same load case: most contacts have the same state.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from problems.model.scene import JointScene
 from solvers.algorithms.newton_sweeps import Case, Sweeps
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
-ENOUGH_MM = LIMIT_MM / 2  # a proven bound that needs no further refinement
+ENOUGH_MM = LIMIT_MM / 2  # a bound that needs no further refinement
 THREADS = 1  # of linear algebra: two workers gain more than two threads
 POWER = 8  # of the mean of gaps that stands for the largest one where that does not change
 
@@ -50,7 +50,9 @@ class Study:
 
 @dataclass(frozen=True)
 class Question:
-    """What plans leave in some cases. base : the plan from whose answers they are estimated; none: proven."""
+    """Asks for the gaps of plans in some cases. base : the plan from whose answers they are estimated; None:
+    they are proven.
+    """
 
     plans: tuple[Plan, ...]
     cases: tuple[int, ...]
@@ -59,8 +61,10 @@ class Question:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of each case: its largest gap, mm, or of a proven answer the least that it is surely not above; the
-    contact where it is; and (Σ y⁸ / m)^⅛ of its gaps y, mm.
+    """The gaps y of a plan, one entry per case.
+
+    largest : the largest gap, mm; of a proven answer an upper bound on it. contact : where it is. mean :
+    (Σ y⁸ / m)^⅛, mm.
     """
 
     largest: tuple[float, ...]
@@ -69,6 +73,8 @@ class Outcome:
 
 
 class PlanSession:
+    """Answers questions of one study; its matrices are made once."""
+
     def __init__(self, study: Study) -> None:
         threadpoolctl.threadpool_limits(THREADS)
         self.study = study
@@ -77,39 +83,34 @@ class PlanSession:
         self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
         self.loads: dict[int, DualLoadCase] = {}
         self.columns: dict[Place, tuple[Vector, Vector]] = {}
-        self.starts = lru_cache(4)(lambda base, k: self._solve(self._loads(base, k), [], ESTIMATE_MM))
+        self.starts = lru_cache(4)(lambda base, k: self.sweeps.together(self._loads(base, k), ESTIMATE_MM))
 
     def answer(self, question: Question) -> list[Outcome]:
-        """Of each plan. The same to the last bit, whatever was asked before."""
+        """The outcome of each plan, the same to the last bit whatever was answered before."""
         starts = [] if question.base is None else self.starts(question.base, question.cases)
         return [self._outcome(self._loads(plan, question.cases), starts) for plan in question.plans]
 
     def _outcome(self, loads: list[DualLoadCase], starts: list[Case]) -> Outcome:
-        """starts : of an estimate, of each case."""
+        """starts : one for each case of an estimate; none: it is proven."""
         if starts:
-            cases = self._solve(loads, starts, ESTIMATE_MM)
+            cases = self.sweeps.together(loads, ESTIMATE_MM, starts)
             gaps = np.column_stack([self.sweeps.vectors(case)[1] for case in cases])
             error = np.zeros(len(loads))
         else:
-            gaps, error = self._proven(loads, self._solve(loads, [], TOLERANCE_MM))
+            gaps, error = self._proven(loads, self.sweeps.together(loads, TOLERANCE_MM))
         largest = gaps.max(axis=0)
         mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
-        return Outcome(*(tuple(each.tolist()) for each in (largest + error, gaps.argmax(axis=0), mean)))
-
-    def _solve(self, loads: list[DualLoadCase], starts: list[Case], tolerance: float) -> list[Case]:
-        self.sweeps.last = []
-        self.sweeps(loads, tolerance, starts)
-        return self.sweeps.last
+        return Outcome(*(tuple(values.tolist()) for values in (largest + error, gaps.argmax(axis=0), mean)))
 
     def _proven(self, loads: list[DualLoadCase], cases: list[Case]) -> tuple[Matrix, Vector]:
         """Gaps (m, k), and how far the largest may be off (k,), mm."""
         lams = [self.sweeps.vectors(case)[0] for case in cases]
-        found = assess(self.proof, loads, lams, [None] * len(loads), ENOUGH_MM)
+        assessed = assess(self.proof, loads, lams, [None] * len(loads), ENOUGH_MM)
         errors = [
-            self.gap_error(load.g, each.x, each.bound_mm).max(initial=0.0)
-            for load, each in zip(loads, found, strict=True)
+            self.gap_error(load.g, answer.x, answer.bound_mm).max(initial=0.0)
+            for load, answer in zip(loads, assessed, strict=True)
         ]
-        return np.column_stack([each.gap for each in found]), np.array(errors)
+        return np.column_stack([answer.gap for answer in assessed]), np.array(errors)
 
     def _loads(self, plan: Plan, numbers: Sequence[int]) -> list[DualLoadCase]:
         new = [k for k in numbers if k not in self.loads]
@@ -127,17 +128,18 @@ class PlanSession:
         """f_z (n,) N and u_z (m,) mm."""
         if place not in self.columns:
             study, assembly = self.study, self.data.assembly
-            given = {"points": (place,), "pattern": None}
-            f = load_case(study.bare, study.form, [study.fastener.model_copy(update=given)]).f
+            moved = study.fastener.model_copy(update={"points": (place,), "pattern": None})
+            f = load_case(study.bare, study.form, [moved]).f
             self.columns[place] = f, assembly.A.T @ assembly.K.solve(f)
         return self.columns[place]
 
 
-_sessions: dict[str, PlanSession] = {}  # the one that this process keeps, so that it opens the assembly once
+_sessions: dict[str, PlanSession] = {}  # the only one of this process, so that it opens the assembly once
 
 
 @in_turn
 def answer(task: tuple[Study, Question]) -> list[Outcome]:
+    """Answer a question in the session that this process keeps for its study."""
     study, question = task
     if study.key not in _sessions:
         _sessions.clear()

@@ -1,4 +1,4 @@
-"""Where load cases come from, by the options that `series` and `place` share: random or measured gaps."""
+"""Where the load cases of `series` and `place` come from: random gaps, or measured ones."""
 
 from __future__ import annotations
 
@@ -18,34 +18,58 @@ RANDOM = 100  # cases, if no number is given
 
 
 @dataclass(frozen=True)
-class GivenCases:
-    """What was given of --cases, --seed, --mean, --sd, --correlation-length, --around and --gaps."""
+class GapCases:
+    """Load cases that differ in their initial gaps, random or measured.
 
-    count: int | None
-    seed: int | None
-    mean: float | None
-    sd: float | None
-    correlation_length: float | None
-    around: Path | None
-    gaps: Path | None
+    Parameters
+    ----------
+    count : int, optional
+        Number of cases; by default 100 random ones, or all of a table.
+    seed : int, optional
+        Seed of the random gaps; by default 0.
+    mean, sd, correlation_length : float, optional
+        Mean, standard deviation and correlation length of the random gaps, mm; by default the scene's.
+    around : Path, optional
+        A scan, CSV with columns x, y and gap in mm, that the random gaps pass through.
+    gaps : Path, optional
+        Measured gaps in place of random ones: .csv, .npz or .npy, one row per case, one column per contact,
+        mm.
+
+    Examples
+    --------
+    >>> from rivetbench import GapCases
+    >>> GapCases(count=200, sd=0.02, correlation_length=150.0).seed is None
+    True
+    """
+
+    count: int | None = None
+    seed: int | None = None
+    mean: float | None = None
+    sd: float | None = None
+    correlation_length: float | None = None
+    around: Path | None = None
+    gaps: Path | None = None
 
     @property
-    def drawn(self) -> list[str]:
-        """The options that are of random gaps alone."""
+    def random_options(self) -> list[str]:
+        """The options given that belong to random gaps alone."""
         names = ("seed", "mean", "sd", "correlation_length", "around")
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
 
     def faults(self, sweep: Sequence[str] = ()) -> list[Fault]:
-        """Of cases from more than one source."""
-        sources = ["--gaps"] * bool(self.gaps), ["--sweep"] * bool(sweep), self.drawn
+        """A fault if the cases come from more than one source."""
+        sources = ["--gaps"] * bool(self.gaps), ["--sweep"] * bool(sweep), self.random_options
         if sum(map(bool, sources)) < 2:
             return []
         allowed = "random gaps, --gaps or --sweep" if sweep else "random gaps or --gaps"
         return [Fault("cases", "given", " ".join(chain(*sources)), allowed)]
 
     def of(self, scene: Scene, form: Form) -> LoadCases:
-        """Raises InputError as these do."""
+        """The load cases of a scene. Raises InputError, as `measured_gaps` and `random_gaps` do."""
         if self.gaps:
             return measured_gaps(scene, self.gaps, self.count, form)
         law = self.mean, self.sd, self.correlation_length
         return random_gaps(scene, self.count or RANDOM, self.seed or 0, *law, form, self.around)
+
+
+DEFAULT = GapCases()

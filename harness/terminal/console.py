@@ -94,7 +94,12 @@ class ConsoleReporter(Reporter):
             self.line.update(task, description=f": {_with_share(text, fraction)}")
 
     def say(self, sentence: str) -> None:
-        self.console.print(f"{sentence}.", style="yellow")
+        self.console.print(f"{sentence}.", style="yellow", soft_wrap=True)
+
+
+def console_of(reporter: Reporter) -> Console:
+    """The console of a reporter; of one that has none, a console that shows nothing."""
+    return reporter.console if isinstance(reporter, ConsoleReporter) else PlainConsole(quiet=True)
 
 
 def _with_share(text: str, fraction: float) -> str:

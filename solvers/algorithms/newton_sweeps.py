@@ -95,19 +95,23 @@ class Sweeps:
         """In place of M."""
         return ContactSprings(self.prepared)
 
-    def __call__(
-        self, loads: Sequence[DualLoadCase], tolerance: float, starts: Sequence[Case] = ()
-    ) -> list[Answer]:
-        """An answer to each load, solved together. starts : of each; else the nearest case of the
-        last ones.
-        """
-        if not starts:
-            before = self.last or [self.solved(loads[0], tolerance)]
-            starts = [_nearest(before, each) for each in loads]
-        self.last = self._sweep(self._begun(starts, loads), tolerance)
-        for case in self.last:
-            case.factor = None  # as large as M for each; the next cases have other sets
+    def __call__(self, loads: Sequence[DualLoadCase], tolerance: float) -> list[Answer]:
+        """An answer to each load, solved together, each from the nearest of the last cases."""
+        nearest = [_nearest(self.last, load) for load in loads if self.last]
+        self.last = self.together(loads, tolerance, nearest)
         return [self.answer(case, tolerance) for case in self.last]
+
+    def together(
+        self, loads: Sequence[DualLoadCase], tolerance: float, starts: Sequence[Case] = ()
+    ) -> list[Case]:
+        """The cases of some loads, solved together, each from its start; without starts, all from the
+        solution of the first load.
+        """
+        starts = starts or [self.solved(loads[0], tolerance)] * len(loads)
+        cases = self._sweep(self._begun(starts, loads), tolerance)
+        for case in cases:
+            case.factor = None  # as large as M for each; the next cases have other sets
+        return cases
 
     def solved(
         self, load: DualLoadCase, tolerance: float, start: DualStart | None = None, C: Mask | None = None

@@ -16,16 +16,16 @@ from small_joints import FASTENERS, GAP, two_parts
 
 from harness import solve
 from harness.placement import search as search_module
-from harness.placement.answer_journal import PLANS, Asked
-from harness.placement.candidates import Movable, Plan, grid, plan_of, uniform_plans
-from harness.placement.fresh_cases import Cases, Goal, decided
-from harness.placement.fresh_cases import searched as searched_by
+from harness.placement.answer_journal import PLANS, AnswerJournal
+from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, uniform_plans
+from harness.placement.fresh_cases import Cases, Goal, search_in_rounds, search_once
 from harness.placement.search import Search
 from harness.placement.session import Outcome, PlanSession, Question, Study
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
 from problems.load_cases.random_gaps import random_gaps
+from problems.reporter import Reporter
 from problems.scene_files import read_scene
 
 
@@ -36,8 +36,16 @@ def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+class Told(Reporter):
+    def __init__(self) -> None:
+        self.sentences: list[str] = []
+
+    def say(self, sentence: str) -> None:
+        self.sentences.append(sentence)
+
+
 def study_of(path: Path, cases: int = 6) -> Study:
-    movable = Movable.of(read_scene(str(path)))
+    movable = MovableFasteners.of(read_scene(str(path)))
     gaps = random_gaps(movable.bare, cases, 0)
     return Study(movable.bare, movable.fastener, gaps, "dual")
 
@@ -206,16 +214,17 @@ def test_no_two_fasteners_next_to_each_other_go_at_once(strip: Path) -> None:
 
 def test_a_plan_that_fresh_cases_refute_is_searched_again(strip: Path) -> None:
     """None of the 60 cases that choose needs more than a fastener, and all after them two."""
-    candidates, lines = plans_of(strip, 1, 4), list[int]()
+    candidates, told_by = plans_of(strip, 1, 4), Told()
     search = replace(told(strip, candidates, lambda plan, case: 2.0 - min(len(plan), 2)), limit_mm=0.5)
+    search.reporter = told_by
     needs_two = search.ask
     easy = told(strip, candidates, lambda plan, case: float(case >= 60 and len(plan) < 2)).ask
     goal = Goal(0.5, 0.95, None)
-    found = decided(
-        replace(search, ask=easy), (), goal, Cases.of(60, False, goal), lambda s, n: lines.append(n)
-    )
+    found = search_in_rounds(replace(search, ask=easy), (), goal, Cases.of(60, False, goal))
     first, second = found.samples
-    assert (len(first.step.plan), first.kept, lines) == (0, 0, [120])
+    assert (len(first.step.plan), first.kept) == (0, 0)
+    (sentence,) = told_by.sentences
+    assert sentence.endswith("that is too few. The search goes on with 120 cases")
     assert (len(second.step.plan), second.kept) == (2, len(second.numbers))
     # Each round spends half of what is left of 5 %.
     assert [len(sample.numbers) for sample in found.samples] == [goal.fresh(0.025), goal.fresh(0.0125)]
@@ -226,15 +235,11 @@ def test_a_plan_that_fresh_cases_refute_is_searched_again(strip: Path) -> None:
     assert not (chosen | samples[0]) & samples[1]
     # Of a table there are no more; where all candidates fail, no more cases help.
     table = Cases([*range(0, 240, 2), *range(60, 240)], 60, True)
-    assert len(decided(replace(search, ask=easy), (), goal, table, pytest.fail).samples) == 1
-    none = decided(
-        replace(search, ask=needs_two, candidates=candidates[:1]),
-        (),
-        goal,
-        Cases.of(60, False, goal),
-        pytest.fail,
-    )
+    assert len(search_in_rounds(replace(search, ask=easy), (), goal, table).samples) == 1
+    few = replace(search, ask=needs_two, candidates=candidates[:1])
+    none = search_in_rounds(few, (), goal, Cases.of(60, False, goal))
     assert (none.best, len(none.samples)) == (None, 1)
+    assert len(told_by.sentences) == 1
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])
@@ -274,7 +279,7 @@ def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: P
 
 @pytest.mark.slow
 def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
-    gaps = random_gaps(Movable.of(read_scene(str(strip))).bare, 40, 7)
+    gaps = random_gaps(MovableFasteners.of(read_scene(str(strip))).bare, 40, 7)
     for rows in (40, 1):
         np.savetxt(tmp_path / f"{rows}.csv", [gaps.load(k).g for k in range(rows)], delimiter=",")
     asked = ("--candidates", "2x6", "--allow-gap", 0.08, "--out")
@@ -297,7 +302,7 @@ def test_few_plans_are_all_compared(strip: Path, count: int) -> None:
     candidates, gaps = plans_of(strip, 2, 4), np.random.default_rng(count)
     plans = {plan: gaps.uniform(size=20) for k in range(9) for plan in combinations(candidates, k)}
     search = told(strip, candidates, lambda plan, case: float(plans[plan][case]), cases=20)
-    _, best = searched_by(replace(search, allowed=1), candidates, Goal(None, 0.95, count))
+    _, best = search_once(replace(search, allowed=1), candidates, Goal(None, 0.95, count))
     assert best.gap_mm == min(sorted(gap)[-2] for plan, gap in plans.items() if len(plan) == count)
 
 
@@ -357,7 +362,7 @@ def test_the_command_finds_a_plan_that_solve_confirms(strip: Path, tmp_path: Pat
     assert min(sample["numbers"]) >= record["cases"]
     assert "# Where they are now." in plan.read_text()
     assert pd.read_csv(tmp_path / "out" / "plan.csv").to_numpy().tolist() == best["plan"]
-    assert [list(p) for p in Movable.of(read_scene(str(plan))).own] == best["plan"]
+    assert [list(p) for p in MovableFasteners.of(read_scene(str(plan))).current] == best["plan"]
     series = harness("series", plan, "--cases", 6, "--allow-gap", 0.05, "--out", tmp_path / "again")
     assert series.exit_code == 0, series.output
     assert "12 fasteners, all candidates: " in done.output  # progress, though this is no terminal
@@ -422,16 +427,16 @@ def test_an_interrupted_search_ends_as_a_whole_one(
 ) -> None:
     whole = place(strip, tmp_path / "whole", "--allow-gap", 0.05)
     assert whole.exit_code == 0
-    keep, kept = Asked._keep, [0]
+    keep, kept = AnswerJournal._keep, [0]
 
-    def interrupted(self: Asked, *given: Any) -> None:
+    def interrupted(self: AnswerJournal, *given: Any) -> None:
         keep(self, *given)
         kept[0] += 1
         if kept[0] == 17:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(Asked, "_keep", interrupted)
+        patch.setattr(AnswerJournal, "_keep", interrupted)
         assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 130
     assert len((tmp_path / "parts" / PLANS).read_text().splitlines()) == 1 + 17
     assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 0
@@ -507,7 +512,7 @@ def test_scenes_whose_fasteners_cannot_move(tmp_path: Path, fasteners: str, said
     path = tmp_path / "scene.toml"
     path.write_text(two_parts() + GAP.replace("60.0", "50.0") + fasteners)
     with pytest.raises(InputError, match=said):
-        Movable.of(read_scene(str(path)))
+        MovableFasteners.of(read_scene(str(path)))
 
 
 def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
@@ -516,7 +521,7 @@ def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
     scene.write_text(two_parts() + GAP.replace("60.0", "50.0") + FASTENERS + installed)
     (tmp_path / "holes.csv").write_text("x,y\n10,10\n30,10\n")
     with pytest.raises(InputError, match=r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"):
-        Movable.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
+        MovableFasteners.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
 
 
 def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) -> None:
@@ -551,7 +556,7 @@ def test_fasteners_in_the_file_of_the_assembly_are_refused_before_the_search(tmp
 def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
-    movable = Movable.of(read_scene(str(path)))
+    movable = MovableFasteners.of(read_scene(str(path)))
     study = Study(movable.bare, movable.fastener, Listed((load_case(movable.bare),)), "dual")
-    (found,) = PlanSession(study).answer(Question((movable.own,), (0,)))
+    (found,) = PlanSession(study).answer(Question((movable.current,), (0,)))
     assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)

@@ -1,0 +1,94 @@
+"""What is recorded of a search for a plan of fasteners: its identity, its outcome, and a sentence on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from harness.placement.candidates import Plan
+from harness.placement.fresh_cases import CONFIDENCE, Found, Goal
+from harness.placement.search import Step
+from harness.placement.session import Study
+from harness.results.provenance import installed_version, provenance
+from problems.forms.assembly import Matrix
+from problems.storage import digest
+from report.document.numbers import counted, position
+
+
+def identity_of(study: Study, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
+    """All that decides what is written, so that one directory holds one search."""
+    holes = {"candidates": candidates, "the scene's fasteners": current}
+    return {
+        **asdict(goal),
+        **{name: f"{counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
+        "scene_key": study.bare.key,
+        "fastener": study.fastener.model_dump(mode="json", include={"preload", "between"}),
+        "cases_key": study.cases.key,
+        "cases": study.cases.count,
+        "form": study.form,
+        "rivetbench_version": installed_version("rivetbench"),
+    }
+
+
+def record_of(
+    study: Study, current: Plan, candidates: Plan, goal: Goal, result: Found, nodes: Matrix
+) -> dict[str, Any]:
+    """The content of place.json."""
+
+    def entry(step: Step, numbers: Sequence[int] = result.numbers) -> dict[str, Any]:
+        limit = float("inf") if goal.limit_mm is None else goal.limit_mm
+        return {
+            "moved": step.moved,
+            "fasteners": len(step.plan),
+            "gap_mm": step.gap_mm,
+            "failing": [numbers[k] for k, gap in enumerate(step.outcome.largest) if gap > limit],
+            "worst_case": numbers[step.worst],
+            "worst_at": nodes[step.outcome.contact[step.worst]].tolist(),
+            "plan": step.plan,
+        }
+
+    return {
+        "scene": study.bare.name,
+        "title": study.bare.title,
+        "cases": len(result.numbers),
+        "chosen_by_share": 1 - goal.allowed(len(result.numbers)) / len(result.numbers),
+        "preload": study.fastener.preload,
+        **asdict(goal),
+        "confidence": CONFIDENCE,
+        "samples": [
+            entry(sample.step, sample.numbers)
+            | {"cases": len(sample.numbers), "numbers": list(sample.numbers)}
+            | {"kept": sample.kept, "interval": sample.interval}
+            for sample in result.samples
+        ],
+        "candidates": candidates,
+        "own": current,
+        "steps": [entry(step) for step in result.steps],
+        "best": None if result.best is None else entry(result.best),
+        "order": [entry(step) for step in result.order],
+        **provenance(),
+    }
+
+
+def sentence_on(result: Found, goal: Goal, nodes: Matrix) -> tuple[str, bool]:
+    """The outcome in words, and whether the plan passed."""
+    step, which = (result.best, "") if result.best else (result.steps[0], "all of the ")
+    sample = result.samples[-1] if result.samples else None
+    if sample:
+        step, words = sample.step, sample.sentence(goal, which)
+    else:
+        leave = "leaves" if len(step.plan) == 1 else "leave"
+        fasteners = f"{which}{counted(len(step.plan), 'fastener')}"
+        words = f"{fasteners} {leave} {step.gap_mm:.3g} mm in the one load case"
+    if goal.limit_mm is None:
+        return f"{words}, proven.", True
+    if step.gap_mm <= goal.limit_mm:
+        return f"PASS: {words}, proven.", True
+    worst = step.worst if sample is None else sample.numbers[step.worst]
+    at = position(*nodes[step.outcome.contact[step.worst]])
+    if sample:
+        share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
+        words += f"; in {share} it is {step.gap_mm:.3g} mm"
+    more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
+    return f"FAIL: {words}, {more}; case {worst} is the worst, at {at}.", False
