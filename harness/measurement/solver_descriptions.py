@@ -192,10 +192,9 @@ def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> b
     """Whether a row is of another scene, series, solver or accuracy, or hit a limit that is wider now."""
     law = m.series.model_dump(exclude={"cases"}) if m.series else {}
     now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated, law)
-    asked = row.get("limit_asked_mm", row.get("limit_mm"))  # older rows have one limit only
     drawn = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
     solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
-    before = (*solved, asked, row.get("gated"), drawn)
+    before = (*solved, row.get("limit_asked_mm"), row.get("gated"), drawn)
     out_of_time = row["status"] in OUT_OF_TIME and row["time_limit_s"] < m.time_limit_s
     left_behind = m.stop_at_times_fastest is not None and bool(row.get("stop"))
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib

@@ -19,6 +19,7 @@ from harness.planning.tolerance_search import exceeded_on, still_needed, time_li
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
+from harness.results.schema import Origin
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import ConsoleReporter, Display
 from harness.verification.reference_problem import (
@@ -58,7 +59,7 @@ def run(
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)
-        origin = {"machine": record_machine(directory, machine()), **provenance()}
+        origin: Origin = {"machine": record_machine(directory, machine()), **provenance()}
         remaining = unmeasured(plan, rows)
         done = len(plan) - len(remaining)
         console.print(f"{suite.name}: {len(plan)} measurements, {done} of them already in {directory}")
@@ -108,7 +109,7 @@ def measure_remaining(
     done: int,
     directory: Path,
     solvers: Solvers,
-    origin: Row,
+    origin: Origin,
     outcomes: Outcomes,
     console: Console,
 ) -> list[Row]:

@@ -12,7 +12,7 @@ from typing import Any
 from harness.planning.plan import Measurement
 from harness.results.provenance import installed_version, machine, provenance
 from harness.results.records import Row
-from harness.results.schema import MEASURED, MEASURED_OF_CASES, STEPS
+from harness.results.schema import MEASURED, STEPS, MeasurementRow, Origin, Provenance
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
@@ -20,7 +20,7 @@ from problems.forms.problem import in_form
 from problems.scene_files import read_scene
 
 from .solver_descriptions import Description
-from .worker import measure
+from .worker import Outcome, measure
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,17 @@ class TaskResult:
     From a worker of a scheduler also the answer files (None if there is none), its machine and its code.
     """
 
-    reports: list[Row]
+    reports: list[Outcome]
     elapsed_s: float
     files: list[bytes | None] | None = None
     machine: dict[str, Any] | None = None
-    code: Row | None = None
+    code: Provenance | None = None
 
 
 def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into that directory."""
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
+    reports: list[Outcome]
     if task.exceeded_on:
         why = f"too slow or too large already on {task.exceeded_on}"
         reports = [{"status": "not_run", "message": why}] * len(batch)
@@ -77,68 +78,70 @@ def run_task_on_worker(task: Task) -> TaskResult:
 
 
 def rows_of(
-    task: Task, result: TaskResult, problem: ReferenceProblem, directory: Path, origin: Row
+    task: Task, result: TaskResult, problem: ReferenceProblem, directory: Path, origin: Origin
 ) -> list[Row]:
-    """The rows of a task, its answers judged. origin : the `machine`, `commit` and `clean` of the process."""
+    """The rows of a task, its answers judged."""
     answers = [directory / "answers" / f"{m.stem}.npz" for m in task.batch]
     for answer, content in zip(answers, result.files or (), strict=bool(result.files)):
         if content is not None:
             answer.write_bytes(content)
-    shared = {
-        **origin,
-        "scene_key": problem.scene.key,
-        "owner": task.solver.owner,
-        "solver_version": task.solver.version,
-        "solver_code": task.solver.code,
-        "rivetbench_version": installed_version("rivetbench"),
-        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
     cases = zip(task.batch, answers, result.reports, strict=True)
-    return [_row(*case, problem, result.elapsed_s, task.solver.owner) | shared for case in cases]
-
-
-def _why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | None:
-    if judgement.verdict != "cannot_be_judged":
-        return None
-    known = problem.reference
-    return f"reference error bound {known.bound_mm:.0e} mm: {known.route}"
+    return [_row(*case, task.solver, problem, result.elapsed_s, origin) for case in cases]
 
 
 def _row(
-    m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, elapsed_s: float, owner: str
+    m: Measurement,
+    answer: Path,
+    report: Outcome,
+    solver: Description,
+    problem: ReferenceProblem,
+    elapsed_s: float,
+    origin: Origin,
 ) -> Row:
-    """The fields of one measurement. owner : of the solver; an answer of ours may be a reference's first
-    candidate.
-    """
-    if "cannot_save" in report:
-        raise OSError(report["cannot_save"])
+    """The row of one measurement. An answer of ours may be the first candidate of a reference."""
     series = m.series.model_dump() if m.series else None
     problem = problem.of_case(series, m.case)
-    if report.get("answer") and report["status"] == "solved" and owner == "ours":
+    if report.get("answer") and report["status"] == "solved" and solver.owner == "ours":
         problem.give(m.solver, answer)
     limit_mm, judgement = problem.limit_mm(m.limit_mm), Judgement("no_answer", problem.reference.bound_mm)
     if report.get("answer"):
         judgement = problem.judge_file(answer, limit_mm)
-    of_case: Row = {}
-    if m.case is not None:
-        of_case = {"case": m.case, "series": series} | {name: report.get(name) for name in MEASURED_OF_CASES}
-    measured: Row = {name: report.get(name) for name in MEASURED}
-    steps = [measured[name] for name in ("load_s", *STEPS) if measured[name] is not None]
-    return {
+    message = report.get("message")
+    if judgement.verdict == "cannot_be_judged":
+        message = f"reference error bound {problem.reference.bound_mm:.0e} mm: {problem.reference.route}"
+    row: MeasurementRow = {
         "key": m.key,
-        **{name: getattr(m, name) for name in ("suite", "scene", "source", "solver", "form", "variant")},
+        "suite": m.suite,
+        "scene": m.scene,
+        "source": m.source,
+        "solver": m.solver,
+        "owner": solver.owner,
+        "form": m.form,
+        "variant": m.variant,
         "n": problem.prepared.assembly.asked,
         "m": problem.prepared.assembly.m,
         "active": int(problem.reference.active.sum()),
-        **{name: getattr(m, name) for name in ("tolerance", "searched", "repeat", "options", "gated")},
+        "tolerance": m.tolerance,
+        "searched": m.searched,
+        "repeat": m.repeat,
+        "options": m.options,
+        "gated": m.gated,
         "limit_mm": limit_mm,
         "limit_asked_mm": m.limit_mm,
-        **of_case,
         "threads_asked": m.threads,
-        **measured,
-        **asdict(judgement),
-        "message": _why_not_judged(judgement, problem) or measured["message"],
-        **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
+        "time_limit_s": m.time_limit_s,
+        "memory_limit_mib": m.memory_limit_mib,
         "stop": m.stop or None,
-        "overhead_s": elapsed_s - sum(steps) if m.case is None else None,
+        **origin,
+        "scene_key": problem.scene.key,
+        "solver_version": solver.version,
+        "solver_code": solver.code,
+        "rivetbench_version": installed_version("rivetbench"),
+        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+    measured: Row = {name: report.get(name) for name in MEASURED}
+    if m.case is None:
+        row["overhead_s"] = elapsed_s - sum(measured[name] or 0.0 for name in ("load_s", *STEPS))
+    else:
+        row |= {"case": m.case, "series": series}
+    return {**row, **measured, **asdict(judgement), "message": message}

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
+from typing import cast
 
 import numpy as np
 import threadpoolctl
@@ -20,6 +21,7 @@ from scipy.linalg import lapack
 from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, resident_mib
 from harness.results.records import Row
+from harness.results.schema import Report
 from harness.solving.session import SolverSession
 from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures, save
 from problems.build import load_case, prepared
@@ -43,35 +45,41 @@ YARDSTICK_REPEATS = 3
 SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib")
 
 
+class Outcome(Report, total=False):
+    """A report at its end. cannot_save : why the answer's file cannot be written, which ends the run."""
+
+    cannot_save: str
+
+
 class Unsupported(InvalidAnswer):
     """The solver does not take this form or way of solving; the text says what it takes."""
 
     status = "unsupported"
 
 
-def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Row]:
+def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Outcome]:
     """Run measurements in one process: one, or load cases of a series. Each answer is saved.
 
     Returns the process's part of each row: status, message, times, peak memory, … If a case ends the process,
     those that follow have its status.
     """
-    first, finished, row = measurements[0], list[Row](), Row()
+    first, finished, fields = measurements[0], list[Outcome](), Row()
     phases = {"start": START_S, "solve": first.time_limit_s * (first.batched or 1), "save": SAVE_S}
     job = measurements, answers
     python = interpreter(first.requirements)
     with Monitored(measure_here, job, first.threads, phases, first.memory_limit_mib, python) as process:
         for event in process:
-            row |= event
+            fields |= event
             if "status" in event:
-                finished.append(row)
-                row = {name: row[name] for name in SHARED if name in row}
+                finished.append(cast(Outcome, fields))
+                fields = {name: fields[name] for name in SHARED if name in fields}
             if len(finished) == len(measurements):
                 break
         last = finished[-1]
         last["peak_rss_mib"] = max(last.get("peak_rss_mib") or 0.0, process.peak_mib) or None
         last["stderr"] = process.stderr_text
     ended = measurements[len(finished) - 1].key
-    lost = {"status": last["status"], "message": f"not run: {ended} ended the process"}
+    lost: Outcome = {"status": last["status"], "message": f"not run: {ended} ended the process"}
     return finished + [lost] * (len(measurements) - len(finished))
 
 
@@ -86,16 +94,24 @@ class Run(Reporter):
 
     def __init__(self, measurements: Sequence[Measurement], answers: Sequence[Path], events: Events) -> None:
         self.measurements, self.answers, self.first = measurements, answers, measurements[0]
-        self.report = events.report
+        self.events = events
+
+    def report(self, fields: Report) -> None:
+        """Report fields of the row of the current load case."""
+        self.events.report(**fields)
+
+    def begin_phase(self, phase: str) -> None:
+        """Start the clock of the limit of a phase of `measure`."""
+        self.events.report(phase=phase)
 
     @contextmanager
     def step(self, name: str, before: float = 0.0) -> Iterator[None]:
         """Report the seconds of a step, and those before, under its name."""
         start = time.perf_counter()
         yield
-        self.report(**{name: before + time.perf_counter() - start})
+        self.events.report(**{name: before + time.perf_counter() - start})
 
-    def outcomes(self) -> Iterator[Row]:
+    def outcomes(self) -> Iterator[Outcome]:
         """Solve the load cases: the last event of each."""
         m, files = self.first, self.answers
         solver = make_solver(m.solver, m.options, Path(m.plugin) if m.plugin else None)
@@ -107,7 +123,7 @@ class Run(Reporter):
             start = time.perf_counter()
             cases = list(load_cases(scene, self.measurements))
             if problem.model_s is not None:
-                self.report(model_s=problem.model_s + time.perf_counter() - start)
+                self.report({"model_s": problem.model_s + time.perf_counter() - start})
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
         session = SolverSession(solver, problem, m.tolerance, self)
@@ -123,7 +139,7 @@ class Run(Reporter):
                 stored.check()
                 yield outcome
 
-    def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Row:
+    def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Outcome:
         """Solve one load case and save its answer: the last event."""
         problem = session.problem
         start = time.perf_counter()
@@ -140,7 +156,7 @@ class Run(Reporter):
 
     def solved_batch(
         self, session: SolverSession, cases: Sequence[LoadCase], answer_files: Sequence[Path]
-    ) -> Iterator[Row]:
+    ) -> Iterator[Outcome]:
         """The same for load cases solved at once; each has an equal share of the time."""
         problem = session.problem
         start = time.perf_counter()
@@ -159,25 +175,27 @@ class Run(Reporter):
         found = problem.recover(lams, own, cases)
         form_s += time.perf_counter() - start
         k = len(cases)
-        shares: Row = {"batched": k, "warm": warm, "solve_s": solve_s / k, "form_s": form_s / k}
+        shares: Report = {"batched": k, "warm": warm, "solve_s": solve_s / k, "form_s": form_s / k}
         for answer, x, file in zip(answers, found, answer_files, strict=True):
             yield self.saved(answer, x, file, problem, figures(answer) | shares)
 
     def begin(self, session: SolverSession) -> None:
         """Start the clock of the solver; before the first load case, convert and prepare."""
-        if session.opened:
-            self.report(phase="solve")
-            return
-        self.report(phase="solve", data_mib=resident_mib("VmRSS"))
-        session.open(batched=self.first.batched is not None)
+        self.begin_phase("solve")
+        if not session.opened:
+            self.report({"data_mib": resident_mib("VmRSS")})
+            session.open(batched=self.first.batched is not None)
 
-    def saved(self, answer: Answer, x: Vector | None, file: Path, problem: Problem, solved: Row) -> Row:
+    def saved(
+        self, answer: Answer, x: Vector | None, file: Path, problem: Problem, fields: Report
+    ) -> Outcome:
         """Report what the solver returned, and save its answer: the last event."""
         stages = " ".join(problem.prepared.opened)
         peak = resident_mib("VmHWM")
-        self.report(phase="save", **solved, **threads_in_effect(), peak_rss_mib=peak, stages=stages)
+        self.begin_phase("save")
+        self.report({**fields, **threads_in_effect(), "peak_rss_mib": peak, "stages": stages})
         if self.first.yardstick and problem.yardstick is not None:
-            self.report(**yardstick(problem.yardstick))
+            self.report(yardstick(problem.yardstick))
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
@@ -207,7 +225,7 @@ def read_all_pages(arrays: Sequence[Matrix]) -> None:
         array.ravel(order="K")[:: PAGE // array.itemsize].sum()
 
 
-def threads_in_effect() -> Row:
+def threads_in_effect() -> Report:
     """BLAS kernels and thread count of the libraries loaded so far."""
     pools = threadpoolctl.threadpool_info()
     blas = [pool for pool in pools if pool["user_api"] == "blas"]
@@ -217,7 +235,7 @@ def threads_in_effect() -> Row:
     }
 
 
-def yardstick(Q: Matrix) -> dict[str, float]:
+def yardstick(Q: Matrix) -> Report:
     """The speed of the machine beside each solve: a Cholesky factorisation of Q and a product Qv.
 
     Seconds of each, median of three: m³/3 operations, and one pass over 8m² bytes.

@@ -49,7 +49,6 @@ from solvers.registry import modules, solver_names
 
 SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
-OLDER = {"together": "batched"}  # keys that older versions wrote
 FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # what a file may be called
 Auto = Annotated[Literal["auto"], Tag(WORD)]
 Repeats = Annotated[Annotated[int, Field(ge=1, le=1000), Tag(VALUE)] | Auto, Discriminator(is_word)]
@@ -202,11 +201,8 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
 
 
 def read_written(path: Path) -> Suite:
-    """The suite.toml of a results directory, perhaps of an older version. Raises InputError."""
-    data = read_toml(path)
-    if isinstance(entries := data.get("solver"), list) and all(isinstance(entry, dict) for entry in entries):
-        data["solver"] = [{OLDER.get(key, key): entry[key] for key in entry} for entry in entries]
-    return validated(data, path)
+    """The suite.toml of a results directory. Raises InputError."""
+    return validated(read_toml(path), path)
 
 
 def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:

@@ -59,16 +59,10 @@ def read_side(name: str, key: str | None = None) -> Side:
     return Side(name, rows)
 
 
-def batched(row: Row) -> int | None:
-    """How many load cases were solved at once; older rows call it `together`."""
-    found = row.get("batched", row.get("together"))
-    return None if found is None else int(found)
-
-
 def measurement(row: Row) -> str:
     """What a row is of, its repeat apart: '4386/0107 ipm dual tol=1e-09 threads=2'."""
     words = [row["scene"], row["solver"], row["form"], row.get("variant"), f"tol={row['tolerance']:g}"]
-    asked = {"threads": row.get("threads_asked"), "batched": batched(row), "case": row.get("case")}
+    asked = {"threads": row.get("threads_asked"), "batched": row.get("batched"), "case": row.get("case")}
     words += [f"{word}={value}" for word, value in asked.items() if value is not None]
     return " ".join(filter(None, words))
 

@@ -13,6 +13,8 @@ import psutil
 
 from problems import __version__
 
+from .schema import Provenance
+
 PACKAGES = ("rivetbench", "numpy", "scipy", "qpsolvers", "osqp", "clarabel", "proxsuite", "piqp")
 #: The folder that holds the project's packages.
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,8 +26,8 @@ OWN_FILES = ("pyproject.toml", "harness/results/provenance.py")
 HOOK_VARIABLES = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR")
 
 
-def provenance() -> dict[str, str | bool | None]:
-    """`commit` and `clean` as every row names them."""
+def provenance() -> Provenance:
+    """The commit of this code, and whether it has no other changes, as every row names them."""
     name, clean = commit()
     return {"commit": name, "clean": clean}
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from problems.errors import Fault, InputError
 from problems.input.bounded_types import regular_file
 
-from .schema import CRC, SERIES
+from .schema import SERIES
 
 Row = dict[str, Any]
 
@@ -119,14 +119,13 @@ def _split(path: Path) -> tuple[list[Row], bytes]:
 
 
 def parsed(text: str | bytes) -> Row:
-    """A JSON object, without the checksum that older versions wrote. Raises ValueError if it is none."""
+    """The JSON object in a text. Raises ValueError if it is none."""
     try:
-        content = json.loads(text)
+        content: object = json.loads(text)
     except RecursionError as error:
         raise ValueError("nested too deep") from error
     if not isinstance(content, dict):
         raise ValueError("not a JSON object")
-    content.pop(CRC, None)
     return content
 
 

@@ -1,18 +1,16 @@
-"""The rows of measurements.jsonl: names, kinds and vocabulary. The standard library alone.
+"""The rows of measurements.jsonl and problems.jsonl: names, kinds and vocabulary. The standard library alone.
 
-One row per measurement. The harness writes these fields and the report reads them; both take the names
-from here. A field that does not apply to a measurement is null.
+A row of measurements.jsonl is one measurement. The harness writes its fields and the report reads them; both
+take the names from here. A field that does not apply to a measurement is null.
 """
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from types import NoneType
+from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 
 #: The file of a series, see series_file.py.
 SERIES = "series.sqlite"
-
-#: An object is a JSON object whose names depend on the solver or the series.
-Kind = Literal["number", "text", "flag", "object"]
 
 #: How a measurement ended. The first four are a solver's report on its answer.
 Status = Literal[
@@ -24,7 +22,7 @@ Status = Literal[
     "memory_limit",
     "crashed",
     "unsupported",  # the solver does not take this form
-    "not_run",  # predicted to exceed the time limit, so not started
+    "not_run",  # the solver exceeded its limits before, so not started
 ]
 STATUSES: tuple[Status, ...] = get_args(Status)
 
@@ -46,66 +44,143 @@ DRAWN = "drawn/"
 #: The steps of a measurement, s; `form_s` is what the form costs per load case beside the solver.
 STEPS = ("convert_s", "prepare_s", "setup_s", "solve_s", "form_s")
 
-
-def _fields(kind: Kind, names: str) -> dict[str, Kind]:
-    return dict.fromkeys(names.split(), kind)
-
-
 #: Who stands behind a solver, in the order of every table.
 OWNERS = ("ours", "textbook", "library")
 
-#: What was requested. owner : of OWNERS; older rows have `in_house` instead.
-#: stop : why time_limit_s is tighter than the suite's. searched : the tolerance is one of those tried for the
-#: loosest that suffices.
-ASKED: dict[str, Kind] = {
-    **_fields("text", "key suite scene source solver owner form variant stop"),
-    **_fields("number", "tolerance threads_asked repeat case time_limit_s memory_limit_mib"),
-    **_fields("number", "limit_mm limit_asked_mm"),
-    **_fields("object", "options series"),
-    **_fields("flag", "gated in_house searched"),
-}
-#: The problem.
-PROBLEM: dict[str, Kind] = {**_fields("number", "n m active"), **_fields("text", "scene_key")}
-#: What the measuring process reports. load_s: to open or make the matrices and loads, imports included;
-#: model_s: of that, to make them, null where they come from the cache. stages: K, and which of
-#: `factors` and `Q` of the dense forms were opened.
-MEASURED: dict[str, Kind] = {
-    **_fields("text", "status message kernels stderr answer stages"),
-    **_fields("number", "iterations inner_iterations"),
-    **_fields("number", " ".join(STEPS)),
-    **_fields(
-        "number", "load_s model_s solver_reported_s data_mib peak_rss_mib threads cholesky_s product_s"
-    ),
-    **_fields("object", "details"),
-}
-#: The same for a case of a series: how many were solved at once, and whether others were solved before.
-MEASURED_OF_CASES: dict[str, Kind] = {**_fields("number", "batched"), **_fields("flag", "warm")}
-#: What the judge finds.
-JUDGED: dict[str, Kind] = {
-    **_fields("text", "verdict"),
-    **_fields("number", "reference_bound_mm displacement_error_mm contact_mismatch min_gap_mm"),
-    **_fields("number", "primal_residual dual_residual duality_gap backward_error objective"),
-}
-#: The checksum of a row, of older versions.
-CRC = "crc32"
 
-#: Where, when and by which code: `commit` is the project's, or the installed version's text.
-ORIGIN: dict[str, Kind] = {
-    **_fields("text", "machine solver_version solver_code rivetbench_version commit recorded_at"),
-    **_fields("text", CRC),
-    **_fields("number", "overhead_s"),
-    **_fields("flag", "clean"),
+class Report(TypedDict, total=False):
+    """The fields that the measuring process reports."""
+
+    status: Status
+    message: str | None  # why there is no answer, or no good one
+    kernels: str | None  # the BLAS libraries loaded
+    stderr: str | None  # its end
+    answer: str | None  # the file of the answer, in the directory
+    stages: str  # K, and which of `factors` and `Q` of the dense forms were opened
+    iterations: int | None
+    inner_iterations: int | None
+    convert_s: float
+    prepare_s: float
+    setup_s: float
+    solve_s: float
+    form_s: float
+    load_s: float  # to open or make the matrices and the loads, imports included
+    model_s: float  # of load_s, to make them; null where they come from the cache
+    solver_reported_s: float | None  # the solver's own figure
+    data_mib: float | None  # memory before the solver begins
+    peak_rss_mib: float | None
+    threads: int | None  # in effect
+    cholesky_s: float  # of Q, and
+    product_s: float  # of Qv: how fast the machine is
+    details: dict[str, Any]  # as the solver names them
+    batched: int | None  # of a series: how many load cases were solved at once
+    warm: bool  # of a series: whether others were solved before
+
+
+class Provenance(TypedDict):
+    """The code that made something."""
+
+    commit: str  # the last that changed code, or the installed version
+    clean: bool | None  # whether the code has no other changes; null if that is not known
+
+
+class Origin(Provenance):
+    """The code and the machine."""
+
+    machine: str
+
+
+class MeasurementRow(Report, Origin, total=False):
+    """A row of measurements.jsonl, with the fields of the judge (harness/verification/judge.py)."""
+
+    key: str  # identity of the measurement
+    suite: str
+    scene: str
+    source: str  # what the scene is read from
+    solver: str
+    owner: str  # of OWNERS
+    form: str
+    variant: str
+    tolerance: float
+    searched: bool  # the tolerance is one of those tried for the loosest that suffices
+    repeat: int
+    options: dict[str, Any]
+    gated: bool
+    threads_asked: int
+    case: int | None  # of a series, its law:
+    series: dict[str, Any] | None
+    time_limit_s: float
+    memory_limit_mib: int
+    stop: str | None  # why time_limit_s is tighter than the suite's
+    limit_mm: float  # for the displacement error, on a rung of a ladder computed; in the suite:
+    limit_asked_mm: float
+
+    n: int
+    m: int
+    active: int  # contacts closed
+    scene_key: str  # a hash of what the scene is made of
+
+    verdict: Verdict
+    reference_bound_mm: float | None
+    displacement_error_mm: float | None
+    contact_mismatch: int | None
+    min_gap_mm: float | None
+    primal_residual: float | None
+    dual_residual: float | None
+    duality_gap: float | None
+    backward_error: float | None
+    objective: float | None
+
+    solver_version: str
+    solver_code: str  # a hash of this project's code for the solver
+    rivetbench_version: str
+    recorded_at: str
+    overhead_s: float | None  # of the measurement, beside load_s and the steps
+
+
+class ProblemRow(TypedDict, total=False):
+    """A row of problems.jsonl: a scene and its reference."""
+
+    scene: str
+    title: str
+    scene_key: str
+    n: int
+    m: int
+    active: int
+    cond_K: float | None
+    lambda_min: float | None
+    lambda_max: float | None
+    build_s: dict[str, float] | None  # by step, see BUILDING
+    stored_mib: dict[str, float]
+    reference_s: float
+    reference_bound_mm: float
+    reference_route: str
+    sparse: dict[str, Any]  # the facts of a reference in the sparse form
+    refused: str  # of a rung that the model should refuse: its message, "" if it is accepted
+    printed_objective: float
+    printed_digits: int
+    printed_source: str
+
+
+#: The kind of a field in JSON. An object's names depend on the solver, the series or the scene.
+Kind = Literal["number", "text", "flag", "object"]
+KINDS: dict[Any, Kind] = {
+    **dict.fromkeys((int, float), "number"),
+    **dict.fromkeys((str, Literal), "text"),
+    bool: "flag",
+    dict: "object",
 }
 
-FIELDS: dict[str, Kind] = {**ASKED, **PROBLEM, **MEASURED, **MEASURED_OF_CASES, **JUDGED, **ORIGIN}
 
-#: The rows of problems.jsonl, one per scene.
-PROBLEM_FIELDS: dict[str, Kind] = {
-    **_fields("text", "scene title scene_key reference_route refused printed_source"),
-    **_fields("number", "n m active cond_K lambda_min lambda_max reference_s reference_bound_mm"),
-    **_fields("number", "printed_objective printed_digits"),
-    **_fields("object", "build_s stored_mib sparse"),
-}
+def kinds(row: type) -> dict[str, Kind]:
+    """The kind of each field of a row."""
+    hints = get_type_hints(row)
+    types = {name: get_args(hint)[0] if NoneType in get_args(hint) else hint for name, hint in hints.items()}
+    return {name: KINDS[get_origin(one) or one] for name, one in types.items()}
+
+
+FIELDS, PROBLEM_FIELDS = kinds(MeasurementRow), kinds(ProblemRow)
+MEASURED = tuple(kinds(Report))
 
 #: The steps of `build_s` by the stage that they make in the dense forms; the sparse form has one, `model`.
 #: (`condition`, the spectrum of K, is for the report alone.)

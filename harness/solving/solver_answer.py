@@ -11,7 +11,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from harness.results.records import Row, replace_arrays, to_line
+from harness.results.records import replace_arrays, to_line
+from harness.results.schema import Report
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.problem import Problem
 from solvers.base import Answer, Status
@@ -163,7 +164,7 @@ def _bounded(digits: str) -> int:
     return value
 
 
-def figures(answer: Answer) -> Row:
+def figures(answer: Answer) -> Report:
     """What the solver reports, for the row."""
     return {
         "iterations": answer.iterations,

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from harness.results.schema import CRC, DRAWN, LADDERS
+from harness.results.schema import DRAWN, LADDERS
 from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
 from report.results.rows import cells_of
@@ -122,7 +122,6 @@ def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dic
     except (ValueError, RecursionError):
         content = None
     if isinstance(content, dict):
-        content.pop(CRC, None)
         return content
     warnings.append(f"{path.name} could not be read and is ignored.")
     return {}

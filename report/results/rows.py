@@ -25,9 +25,9 @@ LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "p
 def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
     """The rows with every field of the schema as a column of one type, the last of equal measurements.
 
-    Flags are 1.0, 0.0 or missing. A row without an `owner` has that of its flag `in_house`. Adds
-    `working_mib`, what the solver needs on top of the data. The size and the limits of a row that lacks them
-    are those of its scene, of `problems` and of the suite.
+    Flags are 1.0, 0.0 or missing. Adds `working_mib`, the memory that the solver needs on top of the data.
+    Missing n, m and active come from problems.jsonl, else from other rows of the scene; missing limits
+    from the suite.
     """
     rows = pd.DataFrame(records)
     for name in [*NUMBERS, *FLAGS]:
@@ -36,8 +36,6 @@ def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str
     for name in TEXTS:
         column = rows[name] if name in rows else pd.Series(None, index=rows.index, dtype=object)
         rows[name] = column.map(_text)
-    of_flag = np.where(rows["in_house"] == 1.0, "ours", "library")
-    rows["owner"] = rows["owner"].where(rows["owner"] != "", of_flag)
     if "scene" in problems:
         known = problems.drop_duplicates("scene", keep="last").set_index("scene")
         for name in {"n", "m", "active"} & set(known):

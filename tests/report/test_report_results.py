@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from synthetic_results import no_answer, row, write_rows
+from synthetic_results import row, write_rows
 
 from report.analysis import checks
 from report.analysis.checks import warnings
@@ -27,16 +27,6 @@ def _drawn_by_one_commit(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def said(directory: Path, *rows: dict[str, Any]) -> list[str]:
     return warnings(read(write_rows(directory, list(rows))))
-
-
-def test_rows_are_taken_at_their_word(tmp_path: Path) -> None:
-    rows = [row(LOW, "mine", owner="textbook", batched=8), row(LOW, "newton", owner=None, in_house=False)]
-    rows += [row(HIGH, "mine", owner=None, in_house=True, **no_answer("not_run"))]
-    rows += [row(HIGH, "newton", **no_answer("crashed"), message="not run: no reason")]
-    found = read(write_rows(tmp_path, rows)).rows
-    assert found["owner"].tolist() == ["textbook", "library", "ours", "ours"]
-    assert found["status"].tolist() == ["solved", "solved", "not_run", "crashed"]
-    assert found["batched"].tolist()[0] == 8
 
 
 # Order and forms.
