@@ -102,7 +102,7 @@ def _row(
     series = m.series.model_dump() if m.series else None
     problem = problem.of_case(series, m.case)
     if report.get("answer") and report["status"] == "solved" and solver.owner == "ours":
-        problem.give(m.solver, answer)
+        problem.add_candidate(m.solver, answer)
     limit_mm, judgement = problem.limit_mm(m.limit_mm), Judgement("no_answer", problem.reference.bound_mm)
     if report.get("answer"):
         judgement = problem.judge_file(answer, limit_mm)

@@ -1,7 +1,7 @@
-"""From the answers to a block of load cases to displacements, gaps, residuals and proven error bounds.
+"""Assesses the answers to a block of load cases: displacements, gaps, residuals and proven error bounds.
 
-Each answer is refined to a proven one (see `proof`); its own bound is the distance to that, and the other's
-bound. All cases of the block share their passes over K.
+Each answer is refined to a proven one (proof.py). The bound of the answer is its distance to the proven one
+plus the bound of that. All cases of the block share their passes over K.
 
 The gap of contact j is y_j = g_j − a_jᵀx*. It is computed as ŷ = fl(g − Aᵀx) from an x with max|x − x*| ≤ e.
 If a_j has k entries, a term of a_jᵀx takes part in at most k + 1 roundings: its product, k − 1 additions and
@@ -31,7 +31,7 @@ from .proof import Proof
 
 @dataclass(frozen=True)
 class Assessment:
-    """One answer: x (n,) mm, gap = g − Aᵀx (m,) mm, and the proven bound max|x − x*| ≤ bound_mm.
+    """An answer with its figures: x (n,) mm, gap = g − Aᵀx (m,) mm, the proven bound max|x − x*| ≤ bound_mm.
 
     active : the number of closed contacts of the proven answer.
     primal_residual, dual_residual, duality_gap : as in `judge`, mm, N, N·mm.
@@ -54,18 +54,19 @@ def assess(
     xs: Sequence[Vector | None],
     enough_mm: float = 0.0,
 ) -> list[Assessment]:
-    """An assessment per load of its finite λ (m,) and, in a form that gives it, the solver's own x (n,).
+    """An assessment of the answer to each load case.
 
-    In the dual form the answer is x = K⁻¹(f − Aλ). enough_mm : a proven answer that is near enough.
+    lams : finite λ (m,) N. xs : the solver's own x (n,) mm; None in the dual form, where x = K⁻¹(f − Aλ).
+    enough_mm : the bound at which a proven answer is refined no further.
     """
     assembly, load = proof.balanced.assembly, stacked(loads)
-    lam, given = np.column_stack(lams), [x for x in xs if x is not None]
-    x = np.column_stack(given) if given else assembly.K.solve(load.f - assembly.A @ lam)
+    lam, own_x = np.column_stack(lams), [x for x in xs if x is not None]
+    x = np.column_stack(own_x) if own_x else assembly.K.solve(load.f - assembly.A @ lam)
     proven = proof.proven(loads, lams, x.T, enough_mm)
-    known = np.column_stack([each.x.hi for each in proven])
+    proven_x = np.column_stack([answer.x.hi for answer in proven])
     gap, r = load.g - assembly.A.T @ x, load.f - assembly.K.multiply(x) - assembly.A @ lam
-    near = np.array([each.bound_mm for each in proven])
-    away = abs(assembly.at_junction(x - known)).max(axis=0, initial=0.0)
+    near = np.array([answer.bound_mm for answer in proven])
+    away = abs(assembly.at_junction(x - proven_x)).max(axis=0, initial=0.0)
     bounds = SAFE * near + (1 + 4 * U) * away
     bounds = np.where(np.isfinite(bounds), bounds, np.inf)
     return [
@@ -84,7 +85,10 @@ def assess(
 
 @dataclass(frozen=True)
 class GapError:
-    """Of an assembly. norms : (m,) ‖a_j‖₁. size : |A|ᵀ. rounding : (m,) γ_{k+2}. underflow : (m,)."""
+    """Bounds the error of gaps computed on one assembly.
+
+    norms : (m,) ‖a_j‖₁. size : |A|ᵀ. rounding : (m,) γ_{k+2}. underflow : (m,) mm.
+    """
 
     norms: Vector
     size: sp.csr_array
@@ -98,9 +102,9 @@ class GapError:
         return cls(norms, abs(assembly.A).T, gamma(k + 2), (k + 2) * ETA)
 
     def __call__(self, g: Vector, x: Vector, error_mm: float) -> Vector:
-        """E (m,) mm, of fl(g − Aᵀx); error_mm : bound on the error of what is asked for of x (n,)."""
+        """E (m,) mm, the error bound of fl(g − Aᵀx), if that of the displacements asked for is error_mm."""
         if not np.isfinite(error_mm):
             return np.full(len(g), np.inf)
         rounding = self.rounding * (abs(g) + self.size @ abs(x))
-        found: Vector = SAFE * (self.norms * error_mm + rounding + self.underflow)
-        return found
+        total: Vector = SAFE * (self.norms * error_mm + rounding + self.underflow)
+        return total

@@ -1,4 +1,4 @@
-"""A problem in units in which its unknowns and contacts weigh alike, and what its load cases share.
+"""A problem in units in which its unknowns and contacts weigh alike, and proven bounds on its matrices.
 
 With D and R, powers of two, D_i √K_ii and R_j ‖DA_j‖₂ about 1,
 
@@ -6,10 +6,10 @@ With D and R, powers of two, D_i √K_ii and R_j ‖DA_j‖₂ about 1,
 
 the same problem without rounding, whatever the units of its unknowns and contacts were.
 
-The smallest eigenvalue of DKD is, whatever the factor of K, at least s less the backward error of a Cholesky
-factorisation of DKD − sI that runs to completion (Rump, BIT 46:433–452, 2006; see `Block.shifted`). One below
-2⁻¹⁰⁰⁰ counts as none: above, what underflows in the factorisation, some n²η with η = 2⁻¹⁰⁷⁴, is within the
-margin's last 1 %.
+If a Cholesky factorisation of DKD − sI runs to completion, the smallest eigenvalue of DKD is at least s less
+the backward error of that factorisation, whatever the factor of K (Rump, BIT 46:433–452, 2006; see
+`Block.shifted`). A result below 2⁻¹⁰⁰⁰ counts as none: above it, the underflow in the factorisation, some n²η
+with η = 2⁻¹⁰⁷⁴, is within the last 1 % of the margin.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from problems.stiffness.operator import Stiffness
 
 from .enclosure import SAFE, DoubleDouble, Enclosure, Panel, Residual, exponent, length, row_panels
 
-SHARES = (1.0, 0.2, 0.02)  # of the guess, tried in turn
-SHARE, STEPS = 0.9, 20  # for AᵀA: of an estimate that is no smaller, by so many steps of the power method
+SHARES = (1.0, 0.2, 0.02)  # shares of the guess, tried in turn
+SHARE, STEPS = 0.9, 20  # for AᵀA: share of an estimate from so many steps of the power method
 SMALLEST = 2.0**-1000
 
 
@@ -102,9 +102,9 @@ class Balanced:
         """
         scale = np.exp2(exponent(abs(z).max(axis=0, initial=0.0)))
         w = z / scale  # whose squares do not underflow
-        found = np.maximum((w * (self.D * self.assembly.K.multiply(self.D * w))).sum(axis=0), 0.0)
-        found += gamma(2 * len(z)) * self.stiffest * length(w) ** 2
-        return SAFE * scale * np.sqrt(found)
+        square = np.maximum((w * (self.D * self.assembly.K.multiply(self.D * w))).sum(axis=0), 0.0)
+        square += gamma(2 * len(z)) * self.stiffest * length(w) ** 2
+        return SAFE * scale * np.sqrt(square)
 
     @cached_property
     def sigma2(self) -> float:
@@ -151,11 +151,11 @@ def independence(A: sp.csc_array) -> float:
         return np.inf
     G, size, ones = Stiffness.of(sp.csc_array(A.T @ A)), abs(A), np.ones(A.shape[1])
     try:
-        found = smallest_eigenvalue(G, ones, [SHARE * about for about in G.least_eigenvalues(ones, STEPS)])
+        least = smallest_eigenvalue(G, ones, [SHARE * about for about in G.least_eigenvalues(ones, STEPS)])
     except NotPositiveDefinite:
         return 0.0
     longest = int(np.diff(sp.csc_array(A).indptr).max())
-    sigma2 = found - SAFE * gamma(longest + 1) * float((size.T @ (size @ ones)).max())
+    sigma2 = least - SAFE * gamma(longest + 1) * float((size.T @ (size @ ones)).max())
     return sigma2 if sigma2 >= SMALLEST else 0.0
 
 

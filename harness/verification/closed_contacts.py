@@ -1,4 +1,4 @@
-"""The gaps of closed contacts made zero: Q_CC dλ = −y_C by an approximate inverse M ≈ Q⁻¹."""
+"""Makes the gaps of closed contacts zero: Q_CC dλ = −y_C by an approximate inverse M ≈ Q⁻¹."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
 
-MAX_SETS = 10  # tried with M for one load case
+MAX_SETS = 10  # contact sets tried with M for one load case
 
 
 @dataclass(frozen=True)
-class Near:
-    """M, if one can be made, and about the diagonal of Q (m,), both in units R (m,) of the contacts."""
+class ScaledInverse:
+    """M ≈ Q⁻¹, None if it cannot be made, and about the diagonal of Q (m,), in units R (m,) of contacts."""
 
     M: BandedInverse | None
     diagonal: Vector
     R: Vector
 
     @classmethod
-    def of(cls, prepared: Prepared, R: Vector) -> Near:
+    def of(cls, prepared: Prepared, R: Vector) -> ScaledInverse:
         with suppress(np.linalg.LinAlgError):  # Q is not positive definite, but for rounding
             if len(R):
-                found = prepared.approximate_inverse
-                return cls(found.M, found.diagonal * R**2, R)
+                plain = prepared.approximate_inverse
+                return cls(plain.M, plain.diagonal * R**2, R)
         return cls(None, np.ones(len(R)), R)
 
     def product(self, v: Vector) -> Vector:
@@ -38,7 +38,7 @@ class Near:
         return u / self.R
 
     def factor(self, N: Mask) -> BandFactor | None:
-        """Of M_NN; None without M, or if rounding makes it indefinite."""
+        """The factor of M_NN; None without M, or if rounding makes M_NN indefinite."""
         if self.M is not None:
             with suppress(np.linalg.LinAlgError):
                 return self.M.factor(N[self.M.order])
@@ -46,16 +46,16 @@ class Near:
 
 
 class ClosedContacts:
-    """C (m,) of a load case, and a first dλ (m,) ≥ −λ.
+    """The closed contacts C (m,) of a load case, and a first dλ (m,) ≥ −λ.
 
     C = {λ_i q_ii > y_i} (semismooth Newton; Hintermüller, Ito and Kunisch, SIAM J. Optim. 13:865–888, 2002)
-    without those whose force would become negative. y (m,) : the gaps that dλ is to close. λ : as it is.
+    without those whose force would become negative. y (m,) : the gaps that dλ is to close. lam : λ (m,).
     """
 
-    def __init__(self, near: Near, y: Vector, lam: Vector) -> None:
-        self.near, C = near, lam * near.diagonal > y
+    def __init__(self, inverse: ScaledInverse, y: Vector, lam: Vector) -> None:
+        self.inverse, C = inverse, lam * inverse.diagonal > y
         for _ in range(MAX_SETS):
-            self.C, self.factor = C, near.factor(~C)
+            self.C, self.factor = C, inverse.factor(~C)
             if self.factor is None:
                 self.dlam = np.where(C, 0.0, -lam)
                 return
@@ -72,8 +72,8 @@ class ClosedContacts:
 
     def _solved(self, factor: BandFactor, v: Vector, lam: Vector | float) -> Vector:
         """u with (M⁻¹u)_C = v_C and u_N = λ_N: u = M(v − t), M_NN t_N = (M v)_N − λ_N."""
-        near = self.near
-        assert near.M is not None
-        u, t = near.product(v), np.empty_like(v)
-        t[near.M.order] = factor.solve((np.where(self.C, 0.0, u - lam) * near.R)[near.M.order])
-        return u - near.product(t * near.R)
+        inverse = self.inverse
+        assert inverse.M is not None
+        u, t = inverse.product(v), np.empty_like(v)
+        t[inverse.M.order] = factor.solve((np.where(self.C, 0.0, u - lam) * inverse.R)[inverse.M.order])
+        return u - inverse.product(t * inverse.R)

@@ -1,12 +1,12 @@
-"""What the gate finds, and its files for a CI: JSON, and JUnit XML, which most of them show row by row.
+"""Findings of the gate, and their files for a CI: JSON, and JUnit XML, which most CI tools show row by row.
 
-The errors of an earlier run are a standard that the gate holds later ones to. A finding is worse than that
+The gate may hold the errors of a run to those of an earlier run, the baseline. A finding is worse than the
 baseline if
 
     error > margin · max(error then, floor),    floor: harness/results/comparison.py
 
-so that 1e-11 mm becoming 9e-8 mm is news, although both are within the limit. The errors of the baseline are
-those in its rows; its answers need not have been kept.
+so that a change from 1e-11 mm to 9e-8 mm is reported, although both are within the limit. The errors of the
+baseline are read from its rows; its answers need not have been kept.
 """
 
 import json
@@ -29,10 +29,7 @@ MARGIN = 10.0  # by which an error may exceed the baseline's
 
 @dataclass(frozen=True)
 class Finding:
-    """One gated measurement, judged again. why : the reason if it has not passed.
-
-    baseline_mm : its error in the baseline.
-    """
+    """One gated measurement, judged again. why : the reason if it failed. baseline_mm : its error there."""
 
     key: str
     judgement: Judgement
@@ -60,25 +57,26 @@ class Baseline:
     margin: float
     errors: Mapping[str, tuple[float, float]]
 
-    def held(self, row: Row, found: Finding) -> Finding:
-        """A row's finding with its error in the baseline, if that was within the limit, and whether it is
-        beyond the margin.
+    def compared(self, row: Row, finding: Finding) -> Finding:
+        """The finding of a row with its error in the baseline, failed if it is beyond the margin.
+
+        Unchanged if the baseline has no error of this measurement within the limit.
         """
-        if (known := self.errors.get(measurement(row))) is None:
-            return found
-        then_mm, then_bound_mm = known
-        found = replace(found, baseline_mm=then_mm)
-        error_mm, bound_mm = found.judgement.displacement_error_mm, found.judgement.reference_bound_mm or 0.0
-        if found.judgement.verdict != "within" or error_mm is None:
-            return found
-        if error_mm <= self.margin * max(then_mm, floor_mm(max(bound_mm, then_bound_mm), found.limit_mm)):
-            return found
-        return replace(found, why=f"more than {self.margin:g} times the baseline's {then_mm:.1e} mm")
+        then_mm, then_bound_mm = self.errors.get(measurement(row), (None, 0.0))
+        if then_mm is None:
+            return finding
+        finding, judged = replace(finding, baseline_mm=then_mm), finding.judgement
+        error_mm, bound_mm = judged.displacement_error_mm, judged.reference_bound_mm or 0.0
+        if judged.verdict != "within" or error_mm is None:
+            return finding
+        if error_mm <= self.margin * max(then_mm, floor_mm(max(bound_mm, then_bound_mm), finding.limit_mm)):
+            return finding
+        return replace(finding, why=f"more than {self.margin:g} times the baseline's {then_mm:.1e} mm")
 
 
 def read_baseline(directory: Path, margin: float, name: str, rows: Iterable[Row]) -> Baseline:
-    """The baseline for the rows of the directory `name`. Raises InputError, Incomparable if it is none of
-    theirs.
+    """The baseline for the rows of the directory `name`. Raises InputError; Incomparable if it has none of
+    these measurements.
     """
     side = read_side(str(directory))
     refuse_incomparable(side, Side(name, list(rows)))
@@ -116,17 +114,17 @@ def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: i
 
 def write_junit(path: Path, findings: Sequence[Finding]) -> None:
     """A test case per finding: a failure if accuracy was lost, an error if nothing could be said."""
-    kinds = ["" if each.passed else "failure" if each.judged else "error" for each in findings]
-    of = Counter(kinds)
-    counts = {"tests": str(len(findings)), "failures": str(of["failure"]), "errors": str(of["error"])}
+    kinds = ["" if one.passed else "failure" if one.judged else "error" for one in findings]
+    count = Counter(kinds)
+    counts = {"tests": str(len(findings)), "failures": str(count["failure"]), "errors": str(count["error"])}
     root = ElementTree.Element("testsuites", counts)
     suite = ElementTree.SubElement(root, "testsuite", {"name": SUITE} | counts)
     for finding, kind in zip(findings, kinds, strict=True):
         scene, _, name = legible(finding.key).partition(" ")
         case = ElementTree.SubElement(suite, "testcase", {"classname": scene, "name": name or scene})
         if kind:
-            said = {"type": finding.judgement.verdict, "message": legible(finding.why)}
-            ElementTree.SubElement(case, kind, said)
+            reason = {"type": finding.judgement.verdict, "message": legible(finding.why)}
+            ElementTree.SubElement(case, kind, reason)
     ElementTree.indent(root)
     _write(path, ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n")
 

@@ -47,13 +47,12 @@ def gate(
     json_file: Path | None = None,
     junit_file: Path | None = None,
 ) -> int:
-    """Judge every gated row of DIRECTORY.
+    """Judge every gated row of DIRECTORY. Raises InputError; Incomparable if the baseline is another suite's.
 
     baseline : the directory of an earlier run, whose errors may be exceeded by the factor `margin` at most.
     Returns 0 if all gated rows are within 1e-7 mm (on a rung of a ladder, what conditioning allows), 1 if
     not (a row is outside, has no answer, is missing, cannot be judged, or is worse than the baseline), 3 if
-    no answer at all could be judged, or compared with the baseline. Raises InputError, Incomparable if the
-    baseline is another suite's.
+    no answer at all could be judged, or compared with the baseline.
     """
     if not directory.is_dir():
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
@@ -64,8 +63,7 @@ def gate(
     rows = gated_rows(directory / records.MEASUREMENTS)
     refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
     standard = read_baseline(baseline, margin, str(directory), rows.values()) if baseline else None
-    found = judged(rows, directory, reference_limit_s, standard)
-    findings = [*found, *never_measured(rows, directory)]
+    findings = [*judged(rows, directory, reference_limit_s, standard), *never_measured(rows, directory)]
     console.print(table(findings))
     code = concluded(findings, standard, console)
     if json_file:
@@ -76,7 +74,7 @@ def gate(
 
 
 def concluded(findings: list[Finding], baseline: Baseline | None, console: Console) -> int:
-    """The exit code, and a sentence on it."""
+    """Print the outcome; returns the exit code."""
     verdicts = [finding.judgement.verdict for finding in findings]
     if not {"within", "outside"} & set(verdicts):
         console.print("Nothing could be judged: no gated row has an answer that can be.", style="red")
@@ -85,8 +83,8 @@ def concluded(findings: list[Finding], baseline: Baseline | None, console: Conso
     if failed:
         console.print(f"Accuracy lost: {failed} of {len(findings)} gated rows.", style="red")
         return FAILED
-    known = sum(finding.baseline_mm is not None for finding in findings)
-    if baseline and not known:
+    compared = sum(finding.baseline_mm is not None for finding in findings)
+    if baseline and not compared:
         why = f"no gated row has an error within its limit in {baseline.name}"
         console.print(f"Nothing could be compared: {why}.", style="red")
         return NOTHING_JUDGED
@@ -94,14 +92,13 @@ def concluded(findings: list[Finding], baseline: Baseline | None, console: Conso
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
     console.print(f"Passed: all {len(findings)} gated rows are within {limits}.", style="green")
     if baseline:
-        console.print(
-            f"{known} of them are in {baseline.name}: none exceeds its error there {baseline.margin:g} times."
-        )
+        times = f"none exceeds its error there {baseline.margin:g} times"
+        console.print(f"{compared} of them are in {baseline.name}: {times}.")
     return DONE
 
 
 def gated_rows(path: Path) -> dict[str, Row]:
-    """By their keys. Raises InputError if a field is missing, of another kind or out of bounds."""
+    """The gated rows by key. Raises InputError if a field is missing, of another kind or out of bounds."""
     rows = records.read(path)
     refuse_wrong_kinds(path, rows, needed=NEEDED)
     faults = []
@@ -126,8 +123,9 @@ def gated_rows(path: Path) -> dict[str, Row]:
 def judged(
     rows: dict[str, Row], directory: Path, limit_s: float | None = None, baseline: Baseline | None = None
 ) -> Iterator[Finding]:
-    """The rows' answers, judged scene by scene, so that each scene is opened once per form choice; not for
-    answers that were not kept.
+    """A finding per row, scene by scene, so that each scene is opened once for each family of forms.
+
+    A scene all of whose answers were not kept is not opened.
     """
     problem: ReferenceProblem | None = None
     opened: tuple[str, str] | None = None
@@ -139,8 +137,8 @@ def judged(
         wanted = row["source"], form_family(row["form"])
         if problem is None or wanted != opened:
             problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
-        found = judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
-        yield baseline.held(row, found) if baseline else found
+        finding = judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
+        yield baseline.compared(row, finding) if baseline else finding
 
 
 def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
@@ -166,7 +164,7 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
 
 
 def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
-    """The gated measurements of the suite that was run without a row; suite.toml itself if it is missing."""
+    """The gated measurements of the suite that have no row; suite.toml itself if it is missing."""
     path = directory / "suite.toml"
     if not path.is_file():
         why = "is missing, so that nobody knows which rows there should be: run again"
@@ -179,9 +177,8 @@ def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
 
 
 def table(findings: list[Finding]) -> Table:
-    made = Table(
-        "measurement", "error mm", "limit mm", "verdict", "why", title="Gate: the answers judged again"
-    )
+    headings = "measurement", "error mm", "limit mm", "verdict", "why"
+    made = Table(*headings, title="Gate: the answers judged again")
     for finding in findings:
         error, verdict = finding.judgement.displacement_error_mm, finding.judgement.verdict
         shown = "–" if error is None else f"{error:.1e}"

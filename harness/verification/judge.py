@@ -2,7 +2,7 @@
 
 With x, λ the answer, x* the reference and y = g − Aᵀx the final gaps:
 
-    displacement_error_mm = max|x − x*|                                    over what is asked for
+    displacement_error_mm = max|x − x*|                                    over the displacements asked for
     backward_error        = max(‖Kx − f + Aλ‖ / F, max|min(λ‖A‖ / F, y / G)|)     max-norms
     min_gap_mm            = min y
     primal_residual       = max(0, max(Aᵀx − g))                          mm
@@ -12,10 +12,10 @@ With x, λ the answer, x* the reference and y = g − Aᵀx the final gaps:
     contact_mismatch      = closed in x* and y > limit, or open in x* and y ≤ limit
 
 The backward error is the residual of the optimality conditions (equilibrium; λ ≥ 0, y ≥ 0, λᵀy = 0) relative
-to their terms, F = ‖K‖‖x‖ + ‖f‖ + ‖A‖‖λ‖ and G = ‖Aᵀ‖‖x‖ + ‖g‖: a stable algorithm reaches about 2⁻⁵³,
-however ill-conditioned K is. The duality gap is the primal objective ½xᵀKx − fᵀx minus the
-dual one −½xᵀKx − gᵀλ. A contact counts as open in x* if its gap there is above 2·limit: with a smaller
-gap, it may be open or closed in an answer within the limit.
+to their terms, F = ‖K‖‖x‖ + ‖f‖ + ‖A‖‖λ‖ and G = ‖Aᵀ‖‖x‖ + ‖g‖. A stable algorithm reaches about 2⁻⁵³,
+however ill-conditioned K is. The duality gap is the primal objective ½xᵀKx − fᵀx minus the dual objective
+−½xᵀKx − gᵀλ. A contact counts as open in x* if its gap there is above 2·limit: a contact with a smaller gap
+may be open or closed in an answer within the limit.
 """
 
 from dataclasses import dataclass
@@ -35,9 +35,10 @@ REFERENCE_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Reference:
-    """x (n,) in mm, λ (m,) in N, the closed contacts, and a bound on max|x − x*| in mm.
+    """The answer that others are compared with: x (n,) in mm and λ (m,) in N, max|x − x*| ≤ bound_mm.
 
-    unit_mm, gap_unit_mm : the length of one unit of x and of the gaps, mm.
+    active : (m,) the closed contacts. route : how it was proven. unit_mm, gap_unit_mm : the length of one
+    unit of x and of the gaps, mm.
     """
 
     x: Vector
@@ -51,7 +52,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The judge's part of a row; None if a figure does not apply."""
+    """The judge's part of a row; a figure that does not apply is None."""
 
     verdict: Verdict
     reference_bound_mm: float | None = None

@@ -1,42 +1,46 @@
 """A proven bound on the displacement error of an answer, from K, A, f, g and forces λ alone.
 
-x and λ ≥ 0 with C = {λ > 0} are the exact answer of another problem, f̃ = f − r and g̃ = g + δ, where
+Any x and λ ≥ 0, with C = {λ > 0}, are the exact answer of another problem, f̃ = f − r and g̃ = g + δ, where
 
     r = f − Kx − Aλ,    s = g − Aᵀx,    δ_i = −s_i for i in C,    δ_i = max(−s_i, 0) else.
 
 The answer is P(K⁻¹f), P the projection onto {Aᵀx ≤ g} in the norm of K. From f to f̃ it moves by at most
 ‖r‖_{K⁻¹}. From g to g̃ the set is translated by d = A(AᵀA)⁻¹δ, and P then moves by at most ‖d‖_K, because
-I − P is nonexpansive. So, in balanced units (see `balanced`), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
+I − P is nonexpansive. So, in balanced units (balanced_units.py), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
 
-    |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).
+    |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).                                     (plain)
 
-Any other d with Aᵀd = δ does as well: d = z + A(AᵀA)⁻¹(δ − Aᵀz) is shorter for z ≈ K⁻¹AQ⁻¹δ. And D_i/√κ may
-be √(K⁻¹)_ii. So a bound that is sharp enough for many load cases takes z = K⁻¹AMδ, M ≈ Q⁻¹, instead of a
-refinement:
+The factor D_i/√κ may be replaced by √(K⁻¹)_ii (compliant). Any other d with Aᵀd = δ bounds the second term as
+well: d = z + A(AᵀA)⁻¹(δ − Aᵀz) is short for z = K⁻¹AMδ, M ≈ Q⁻¹. This costs one solution with K and saves
+the refinement of many load cases:
 
-    |x_i − x*_i| ≤ √(K⁻¹)_ii ( ‖r‖₂/√κ + ‖z‖_K + ‖δ − Aᵀz‖₂ √(‖K‖_∞/σ²) ).
+    |x_i − x*_i| ≤ √(K⁻¹)_ii ( ‖r‖₂/√κ + ‖z‖_K + ‖δ − Aᵀz‖₂ √(‖K‖_∞/σ²) ).                    (translated)
 
 Nothing is assumed about the contact set: weakly active contacts need no special treatment, and it does not
-matter where λ came from. The bound is made small by a refinement of x and λ_C in twice the working precision:
+matter where λ came from. Refinement of x and λ_C in twice the working precision makes the bound small:
 
     x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
 
-by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M ≈ Q⁻¹ (see `near`). Load
-cases are columns, left out when done.
+by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M (closed_contacts.py). Load
+cases are columns; a column is taken out when its bound is small enough.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
+from problems import storage
 from problems.forms.assembly import LoadCase, Mask, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.stiffness import gamma
+from problems.storage import fingerprint
 
 from .balanced_units import Balanced
-from .closed_contacts import ClosedContacts, Near
+from .closed_contacts import ClosedContacts, ScaledInverse
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
 
 MAX_PASSES = 30
@@ -62,29 +66,34 @@ class Proven:
         return self.lam.hi > 0
 
 
-class Proof:
-    """What the load cases of an assembly share.
+class Sharpness(Enum):
+    """The bounds of this file; each but the first costs more than the one before."""
 
-    kappa : κ ≤ λmin(DKD), in balanced units. remembered : the figure of that name, or what makes it.
+    PLAIN = "plain"
+    COMPLIANT = "compliant"
+    TRANSLATED = "translated"
+
+
+class Proof:
+    """Bounds the displacement error of answers on one assembly.
+
+    kappa : κ ≤ λmin(DKD), in balanced units.
     """
 
-    def __init__(
-        self,
-        prepared: Prepared,
-        kappa: float,
-        remembered: Callable[[str, Callable[[], float]], float] = lambda name, make: make(),
-    ) -> None:
-        self.balanced, self.kappa, self.remembered = Balanced.of(prepared), kappa, remembered
+    def __init__(self, prepared: Prepared, kappa: float) -> None:
+        self.balanced, self.kappa = Balanced.of(prepared), kappa
 
     @cached_property
-    def near(self) -> Near:
-        """Made when an answer is first refined."""
-        return Near.of(self.balanced.prepared, self.balanced.R[:, 0])
+    def inverse(self) -> ScaledInverse:
+        """M ≈ Q⁻¹, made when an answer is first refined."""
+        return ScaledInverse.of(self.balanced.prepared, self.balanced.R[:, 0])
 
     @cached_property
     def compliance(self) -> float:
         """max (K⁻¹)_ii or more, mm/N; infinite without M or where no bound is cheap."""
-        return np.inf if self.near.M is None else self.remembered("compliance", self._largest_compliance)
+        if self.inverse.M is None:
+            return np.inf
+        return cached_figure(self.balanced.prepared, "compliance", self._largest_compliance)
 
     def _largest_compliance(self) -> float:
         K, D = self.balanced.assembly.K, self.balanced.D[:, 0]
@@ -106,9 +115,10 @@ class Proof:
         xs: Iterable[Vector] | None = None,
         enough_mm: float = 0.0,
     ) -> list[Proven]:
-        """From forces λ (m,) N of each load case, and about their displacements x (n,), if known.
+        """A refined answer with its bound for each load case.
 
-        enough_mm : a bound that needs no further pass; one about the rounding of x never does.
+        lams : forces (m,) N. xs : about their displacements (n,) mm, computed by default. enough_mm : a bound
+        that needs no further pass, as does none that is about the rounding of x.
         """
         units, load = self.balanced, self.balanced.load(loads)
         load = LoadCase(np.broadcast_to(load.f, (len(units.D), len(loads))), load.g)
@@ -116,15 +126,16 @@ class Proof:
         x = units.solve(load.f - units.A @ lam) if xs is None else np.column_stack(list(xs)) / units.D
         x2, lam2 = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
         quick = enough_mm > 0 and np.isfinite(self.compliance)
+        sharpness = Sharpness.COMPLIANT if quick else Sharpness.PLAIN
         r, s = units.residuals(load, x2, lam2, sharp=not quick)
         best = [Proven(x2[:, k], lam2[:, k], np.inf) for k in range(len(loads))]
         worse = np.zeros(len(loads), dtype=int)  # passes since a bound was halved
-        left = np.arange(len(loads))  # the load cases of the columns
-        bounds, rounding = self.bounds(x2, lam2, r, s, quick, translated=quick)
+        cases = np.arange(len(loads))  # the load case of each column
+        bounds, rounding = self.bounds(x2, lam2, r, s, Sharpness.TRANSLATED if quick else sharpness)
         for step in range(MAX_PASSES):
             enough = np.maximum(enough_mm, AT_ROUNDING * rounding)
-            going = np.zeros(len(left), dtype=bool)
-            for column, k in enumerate(left):
+            going = np.zeros(len(cases), dtype=bool)
+            for column, k in enumerate(cases):
                 bound = float(bounds[column])
                 worse[k] = 0 if bound <= best[k].bound_mm / 2 else worse[k] + 1
                 if bound < best[k].bound_mm:
@@ -133,7 +144,7 @@ class Proof:
             if not (going.any() and self.kappa > 0):
                 break
             if not going.all():
-                left, load = left[going], LoadCase(load.f[:, going], load.g[:, going])
+                cases, load = cases[going], LoadCase(load.f[:, going], load.g[:, going])
                 x2, lam2, r, s = x2[:, going], lam2[:, going], r[:, going], s[:, going]
             dx, dlam = self.corrections(r.value, s.value, lam2.hi, enough_mm)
             dlam = np.maximum(dlam, -lam2.hi)
@@ -142,12 +153,12 @@ class Proof:
             lam2 = DoubleDouble(np.where(negative, 0, lam2.hi), np.where(negative, 0, lam2.lo))
             if step == 0 and enough_mm:  # what was in float64 has moved by dx and dλ without rounding
                 r, s = units.moved(r, s, dx, dlam)
-                bounds, rounding = self.bounds(x2, lam2, r, s, quick)
+                bounds, rounding = self.bounds(x2, lam2, r, s, sharpness)
             if step or not (bounds <= enough_mm).all():
                 r, s = units.residuals(load, x2, lam2)
                 bounds, rounding = self.bounds(x2, lam2, r, s)
         D, R = units.D[:, 0], units.R[:, 0]
-        return [Proven(each.x.scaled(D), each.lam.scaled(R), each.bound_mm) for each in best]
+        return [Proven(answer.x.scaled(D), answer.lam.scaled(R), answer.bound_mm) for answer in best]
 
     def bounds(
         self,
@@ -155,22 +166,18 @@ class Proof:
         lam: DoubleDouble,
         r: Enclosure,
         s: Enclosure,
-        compliant: bool = False,
-        translated: bool = False,
+        sharpness: Sharpness = Sharpness.PLAIN,
     ) -> tuple[Vector, Vector]:
-        """(k,) mm of each column, and what of it is due to the rounding of x to float64.
-
-        compliant : by √(K⁻¹)_ii in place of D_i/√κ. translated : by z, with a solution with K.
-        """
-        units, asked = self.balanced, self.balanced.assembly.at_junction
+        """The bound of each column (k,) mm, and its part that is due to the rounding of x to float64."""
+        units, at_junction = self.balanced, self.balanced.assembly.at_junction
         pressing = lam.hi > 0
         delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
         uncertain = s.error * (pressing | (s.value < s.error))
-        D, lo = asked(units.D), abs(asked(x.lo))
+        D, lo = at_junction(units.D), abs(at_junction(x.lo))
         reach, distance = D / np.sqrt(self.kappa), np.zeros(x.hi.shape[1])
-        if compliant:
+        if sharpness is not Sharpness.PLAIN:
             reach = np.minimum(reach, np.sqrt(self.compliance))
-        if translated:
+        if sharpness is Sharpness.TRANSLATED:
             delta, uncertain, distance = self._translated(delta, uncertain)
         missed, force = length(abs(delta) + uncertain), length(abs(r.value) + r.error)
         stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0
@@ -182,22 +189,22 @@ class Proof:
     def _translated(self, delta: Matrix, uncertain: Matrix) -> tuple[Matrix, Matrix, Vector]:
         """δ − Aᵀz (m, k), how uncertain it is, and ‖z‖_K or more (k,)."""
         units = self.balanced
-        z = units.solve(units.A @ np.column_stack([self.near.product(column) for column in delta.T]))
-        left = delta - units.At @ z
+        z = units.solve(units.A @ np.column_stack([self.inverse.product(column) for column in delta.T]))
+        rest = delta - units.At @ z
         roundings = int(np.diff(units.At.indptr).max(initial=0)) + 1
         rounding = gamma(roundings) * (abs(delta) + abs(units.At) @ abs(z)) + roundings * ETA * z.any(axis=0)
-        return left, uncertain + SAFE * rounding, units.energy(z)
+        return rest, uncertain + SAFE * rounding, units.energy(z)
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float = 0.0) -> tuple[Matrix, Matrix]:
         """dx (n, k) and dλ (m, k) that make r zero, and s at closed contacts, in balanced units.
 
-        r (n, k), s (m, k), λ (m, k) : as they are. enough_mm : a displacement that does not count.
+        r (n, k), s (m, k), λ (m, k) : those of the answers. enough_mm : a displacement that does not count.
         """
         units = self.balanced
         dx = units.solve(r)
         y = s - units.At @ dx
-        starts = [ClosedContacts(self.near, *columns) for columns in zip(y.T, lam.T, strict=True)]
+        starts = [ClosedContacts(self.inverse, *columns) for columns in zip(y.T, lam.T, strict=True)]
         C = np.column_stack([start.C for start in starts])
         dlam = np.column_stack([start.dlam for start in starts])
         w = units.solve(units.A @ dlam)
@@ -206,7 +213,7 @@ class Proof:
         target = REDUCTION * length(np.where(C, y, 0.0))
         if enough_mm:
             target = np.maximum(target, enough_mm / 2 / self.spread)
-        direction, before = np.zeros_like(missed), np.ones(missed.shape[1])
+        direction, previous = np.zeros_like(missed), np.ones(missed.shape[1])
         for _ in range(MAX_PRODUCTS):
             going = length(missed) > target
             if not going.any():
@@ -214,11 +221,21 @@ class Proof:
             columns = zip(starts, missed.T, strict=True)
             z = np.where(going, np.column_stack([start.precondition(v) for start, v in columns]), 0.0)
             product = (missed * z).sum(axis=0)
-            direction = z + np.where(product > 0, product / before, 0.0) * direction
+            direction = z + np.where(product > 0, product / previous, 0.0) * direction
             w = units.solve(units.A @ direction)
             q = np.where(C, units.At @ w, 0.0)
             energy = (direction * q).sum(axis=0)
             step = np.where(going & (energy > 0), product / energy, 0.0)
             dlam, dx, missed = dlam + step * direction, dx - step * w, missed - step * q
-            before = np.where(product > 0, product, 1.0)
+            previous = np.where(product > 0, product, 1.0)
         return dx, dlam
+
+
+def cached_figure(prepared: Prepared, name: str, make: Callable[[], float]) -> float:
+    """A figure of an assembly that takes a while to make, from the cache if it was made before."""
+    if prepared.key is None:
+        return make()
+    code = fingerprint([Path(__file__)], within=["harness/verification", "problems/stiffness"])
+    key = storage.digest(name, prepared.key, code)
+    _, facts = storage.load_or_make(key, lambda: ({}, {"value": repr(make())}))
+    return float(facts["value"])

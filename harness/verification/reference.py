@@ -1,14 +1,13 @@
 """The reference that answers are compared with: forces from anywhere, refined, with a proven bound.
 
-Nothing is searched for here. Candidates are the problem's exact answer, if it was made from one, forces that
-the caller has, and the answers of the in-house methods in turn; each is refined and its error bounded from K,
-A, f and g alone (see `proof`), until a bound is at most a tenth of the limit. The bound does not depend on
-where the forces came from; the best one is kept.
+The reference of a problem that was made from its exact answer is that answer. Else candidates are tried:
+forces that the caller has, then the answers of the in-house methods in turn. Each is refined and its error
+bounded from K, A, f and g alone (proof.py), until a bound is at most a tenth of the limit; the best one is
+kept. The bound does not depend on where the forces came from.
 """
 
 import time
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -23,13 +22,13 @@ from problems.storage import fingerprint
 
 from .balanced_units import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
-from .proof import Proof, Proven
+from .proof import Proof, Proven, cached_figure
 
-#: What forces come from, and λ (m,) in N.
+#: The name of a method, and its λ (m,) in N.
 Candidate = tuple[str, Vector]
 STOPPED = "no further method was tried"
 UNPROVEN = "could not be proven"
-ESTIMATED = 0.5  # of an estimate of λmin that is no smaller
+ESTIMATED = 0.5  # share of an estimate of λmin, which is not below λmin
 
 
 def default_limit_s(m: int) -> float:
@@ -42,49 +41,56 @@ def reference_of(
     prepared: Prepared,
     load: LoadCase,
     limit_s: float | None = None,
-    given: Sequence[Candidate] = (),
+    first: Sequence[Candidate] = (),
 ) -> Reference:
-    """The reference of a scene: the answer that it was made from, if any, else that of its load case."""
+    """The reference of a scene: the answer that it was made from, if any, else that of its load case.
+
+    first : candidates that are tried before the in-house methods. limit_s : see `best_of_candidates`.
+    """
     made = scene.made if isinstance(scene, ManufacturedScene) else None
     if made is not None and made.x is not None and made.lam is not None:
-        return Reference(
-            made.x.copy(), made.lam.copy(), made.lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm
-        )
-    return reference(prepared, load, limit_s, given)
+        x, lam, units = made.x.copy(), made.lam.copy(), (made.unit_mm, made.gap_unit_mm)
+        return Reference(x, lam, lam > 0, 0.0, "chosen, exact", *units)
+    return reference(prepared, load, limit_s, first)
 
 
 def reference(
-    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Candidate] = ()
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, first: Sequence[Candidate] = ()
 ) -> Reference:
     """The reference of a load case, from the cache if it was proven before for these matrices."""
     if prepared.key is None:
-        return best_of_candidates(prepared, load, limit_s, given)
-    key = storage.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
+        return best_of_candidates(prepared, load, limit_s, first)
+    code = fingerprint([Path(__file__)], within=["harness/verification", "problems/stiffness"])
+    key = storage.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), code)
     stored = storage.load(key)
     if stored is not None:
         arrays, facts = stored
         x, lam = (np.array(arrays[name]) for name in ("x", "lam"))
         return Reference(x, lam, lam > 0, facts["bound_mm"], facts["route"])
-    found = best_of_candidates(prepared, load, limit_s, given)
-    if found.bound_mm <= REFERENCE_SHARE * LIMIT_MM:  # else another candidate may prove more
-        arrays = {"x": found.x, "lam": found.lam}
-        facts = {"bound_mm": found.bound_mm, "route": found.route}
+    best = best_of_candidates(prepared, load, limit_s, first)
+    if best.bound_mm <= REFERENCE_SHARE * LIMIT_MM:  # else another candidate may prove more
+        arrays = {"x": best.x, "lam": best.lam}
+        facts = {"bound_mm": best.bound_mm, "route": best.route}
         storage.load_or_make(key, lambda: (arrays, facts))  # unless another process was faster
-    return found
+    return best
 
 
 def best_of_candidates(
-    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Candidate] = ()
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, first: Sequence[Candidate] = ()
 ) -> Reference:
-    """given : tried first. limit_s : after it no further candidate is tried."""
+    """The candidate with the smallest bound, refined.
+
+    limit_s : seconds after which no further candidate is tried; by default see `default_limit_s`. first :
+    candidates that are tried before the in-house methods.
+    """
     limit_s = default_limit_s(prepared.assembly.m) if limit_s is None else limit_s
     proof, end = proof_of(prepared), time.monotonic() + limit_s
     best: Proven | None = None
     route = stopped = ""
-    for name, lam in chain(given, candidates(prepared, load)):
-        (found,) = proof.proven([load], [lam])
-        if best is None or found.bound_mm < best.bound_mm:
-            best, route = found, name
+    for name, lam in chain(first, candidates(prepared, load)):
+        (refined,) = proof.proven([load], [lam])
+        if best is None or refined.bound_mm < best.bound_mm:
+            best, route = refined, name
         if best.bound_mm <= REFERENCE_SHARE * LIMIT_MM:
             break
         if time.monotonic() > end:
@@ -92,13 +98,13 @@ def best_of_candidates(
             break
     if best is None:  # no method gave an answer
         (best,), route = proof.proven([load], [np.zeros(prepared.assembly.m)]), "no forces"
-    said = "" if np.isfinite(best.bound_mm) else f"{UNPROVEN}: "
-    return Reference(best.x.hi, best.lam.hi, best.active, best.bound_mm, f"{said}{route}{stopped}")
+    unproven = "" if np.isfinite(best.bound_mm) else f"{UNPROVEN}: "
+    return Reference(best.x.hi, best.lam.hi, best.active, best.bound_mm, f"{unproven}{route}{stopped}")
 
 
 def proof_of(prepared: Prepared) -> Proof:
-    """What the load cases of an assembly share."""
-    return Proof(prepared, proven_lambda_min(prepared), partial(_remembered, prepared))
+    """The proof for an assembly, with its κ."""
+    return Proof(prepared, proven_lambda_min(prepared))
 
 
 def proven_lambda_min(prepared: Prepared) -> float:
@@ -108,19 +114,4 @@ def proven_lambda_min(prepared: Prepared) -> float:
     def proven() -> float:
         return smallest_eigenvalue(K, K.units, [ESTIMATED * about for about in K.least_eigenvalues(K.units)])
 
-    return _remembered(prepared, "lambda_min", proven)
-
-
-def _remembered(prepared: Prepared, name: str, make: Callable[[], float]) -> float:
-    """A figure of an assembly that takes a while, from the cache."""
-    if prepared.key is None:
-        return make()
-    _, facts = storage.load_or_make(
-        storage.digest(name, prepared.key, _code()), lambda: ({}, {"value": repr(make())})
-    )
-    return float(facts["value"])
-
-
-def _code() -> str:
-    """The fingerprint of the code for references: those of other code are recomputed."""
-    return fingerprint([Path(__file__)], within=["harness/verification", "problems/stiffness"])
+    return cached_figure(prepared, "lambda_min", proven)

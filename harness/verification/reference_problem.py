@@ -1,4 +1,4 @@
-"""A scene with its matrices and its reference: what answers are judged on, and what is recorded of it."""
+"""A scene with its matrices and its reference, on which answers are judged; its row in problems.jsonl."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ PROBLEMS = "problems.jsonl"
 class ReferenceProblem:
     """A scene whose answers can be measured and judged; its reference is proven when it is first asked for.
 
-    limit_s : after it no further candidate for the reference is tried. case : of a series, whose own load is
-    `load`; None for the scene's. given : the first candidates.
+    limit_s : after it no further candidate for the reference is tried. case : the number of the load case in
+    a series; None for the scene's own. first : candidates that are tried before the in-house methods.
     """
 
     scene: Scene
@@ -42,7 +42,7 @@ class ReferenceProblem:
     form: Form
     limit_s: float | None = None
     case: int | None = None
-    given: list[Candidate] = field(default_factory=list)
+    first: list[Candidate] = field(default_factory=list)
 
     @cached_property
     def reference(self) -> Reference:
@@ -50,41 +50,41 @@ class ReferenceProblem:
 
     @property
     def reference_s(self) -> float:
-        """The seconds that it took."""
+        """The seconds that the reference took."""
         return self._proven[1]
 
     @cached_property
     def _proven(self) -> tuple[Reference, float]:
         start = time.perf_counter()
         if self.case is None:
-            found = reference_of(self.scene, self.prepared, self.load, self.limit_s, self.given)
+            proven = reference_of(self.scene, self.prepared, self.load, self.limit_s, self.first)
         else:
-            found = reference(self.prepared, self.load, self.limit_s, self.given)
-        return found, time.perf_counter() - start
+            proven = reference(self.prepared, self.load, self.limit_s, self.first)
+        return proven, time.perf_counter() - start
 
-    def give(self, name: str, path: Path) -> None:
+    def add_candidate(self, name: str, path: Path) -> None:
         """Let the forces of a saved answer be a candidate of that name, if they can be read."""
         with suppress(OSError, ValueError, KeyError):
             lam = read_answer(path)["lam"]
             if lam.dtype.kind == "f" and lam.shape == self.load.g.shape and np.isfinite(lam).all():
-                self.given.append((f"{name}, refined", lam))
+                self.first.append((f"{name}, refined", lam))
 
-    def limit_mm(self, asked: float) -> float:
-        """The limit on an answer: as asked for; on a rung of a ladder, no less than conditioning allows."""
+    def limit_mm(self, usual_mm: float) -> float:
+        """The limit on an answer: the usual one; on a rung of a ladder no less than conditioning allows."""
         if not self.scene.on_ladder:
-            return asked
+            return usual_mm
         data = self.prepared
         largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
-        return conditioned_limit(asked, data.condition, largest)
+        return conditioned_limit(usual_mm, data.condition, largest)
 
     def of_case(self, series: dict[str, Any] | None, case: int | None) -> ReferenceProblem:
-        """The same for a load case of a series, with its own reference."""
+        """The problem of a load case of a series, with a reference of its own."""
         if series is None or case is None:
             return self
         from problems.load_cases.stream import drawn_cases  # of a series only
 
         load = drawn_cases(self.scene, self.form, **series).load(case)
-        return replace(self, load=load, case=case, given=[])
+        return replace(self, load=load, case=case, first=[])
 
     def judged(self, x: Vector, lam: Vector, limit_mm: float) -> Judgement:
         """x of all unknowns of the form, mm; lam (m,) N, NaN if there are none."""
@@ -110,7 +110,7 @@ def opened(
 ) -> ReferenceProblem:
     """Open or build a scene. Raises InputError.
 
-    form : that of the answers; those of the sparse form have an entry of x per unknown of the model.
+    form : the form of the answers; in the sparse form, x has an entry per unknown of the model.
     """
     data = prepared(scene, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
@@ -140,7 +140,7 @@ def reference_problem(
     limit_s: float | None = None,
     form: Form = "dual",
 ) -> ReferenceProblem:
-    """The same, with its reference proven."""
+    """Open or build a scene and prove its reference. Raises InputError as `measurable` does."""
     problem = measurable(source, limit_s=limit_s, form=form)
     _ = problem.reference
     return problem
@@ -152,15 +152,15 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     The facts of a reference in the sparse form are under `sparse`, with the largest difference between its x
     and that of the condensed matrices, if both were made.
     """
-    scene, facts, known = problem.scene, problem.prepared.facts, problem.reference
-    assembly = problem.prepared.assembly
+    scene, assembly, reference = problem.scene, problem.prepared.assembly, problem.reference
+    facts, x = problem.prepared.facts, assembly.at_junction(reference.x)
     contacts = directory / "scenes" / (scene.name.replace("/", "_") + ".npz")
     of_family: dict[str, Any] = {
         "build_s": facts.get("seconds"),
         "stored_mib": problem.prepared.stored_mib,
         "reference_s": problem.reference_s,
-        "reference_bound_mm": known.bound_mm,
-        "reference_route": known.route,
+        "reference_bound_mm": reference.bound_mm,
+        "reference_route": reference.route,
     }
     row: dict[str, Any] = {
         "scene": scene.name,
@@ -168,34 +168,27 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
         "scene_key": scene.key,
         "n": assembly.asked,
         "m": assembly.m,
-        "active": int(known.active.sum()),
+        "active": int(reference.active.sum()),
         **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},
         **of_family,
     }
     if printed := scene.printed:
         row |= {"printed_objective": printed.value, "printed_digits": printed.digits}
         row["printed_source"] = printed.source
-    recorded = _recorded(directory).get(scene.name)
-    before = recorded if recorded and recorded.get("scene_key") == scene.key else None
-    x = assembly.at_junction(known.x)
-    sparse = before.get("sparse", {}) if before else {}
+    earlier = _recorded(directory).get(scene.name)
+    if earlier and earlier.get("scene_key") != scene.key:
+        earlier = None
+    sparse = earlier.get("sparse", {}) if earlier else {}
     if problem.form == "sparse":
-        row = (before or row) | {"sparse": sparse | {"unknowns": assembly.n, **of_family}}
+        row = (earlier or row) | {"sparse": sparse | {"unknowns": assembly.n, **of_family}}
     elif sparse:
         row["sparse"] = sparse
-    if before and (problem.form == "sparse") != bool(sparse) and "from_condensed_mm" not in sparse:
-        with (
-            suppress(OSError, KeyError, ValueError),
-            np.load(contacts) as other,
-        ):  # of the other family of forms
-            row["sparse"]["from_condensed_mm"] = float(abs(other["x"] - x).max())
+    if earlier and (problem.form == "sparse") != bool(sparse) and "from_condensed_mm" not in sparse:
+        with suppress(OSError, KeyError, ValueError), np.load(contacts) as other_family:
+            row["sparse"]["from_condensed_mm"] = float(abs(other_family["x"] - x).max())
     _put(row, directory)
-    arrays = {
-        "x": x,
-        "gap_before": problem.load.g,
-        "gap_after": problem.load.g - assembly.A.T @ known.x,
-        "lam": known.lam,
-    }
+    gap = problem.load.g - assembly.A.T @ reference.x
+    arrays = {"x": x, "gap_before": problem.load.g, "gap_after": gap, "lam": reference.lam}
     if assembly.contact_nodes is not None:
         arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(scene, JointScene):

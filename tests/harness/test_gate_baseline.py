@@ -72,7 +72,7 @@ def test_below_either_bound_no_digit_is_lost(
     row = rows_of(finished)[0]
     baseline = Baseline("then", 10.0, {measurement(row): (1e-12, then)})
     now = Judgement("within", reference_bound_mm=bound, displacement_error_mm=error)
-    assert baseline.held(row, Finding("now", now, 1e-7)).passed is not exceeded
+    assert baseline.compared(row, Finding("now", now, 1e-7)).passed is not exceeded
 
 
 def test_a_baseline_outside_its_limit_is_no_standard(finished: Path, copy: Path, tmp_path: Path) -> None:

@@ -87,8 +87,8 @@ def test_a_reference_is_proven_from_the_first_answer_that_is_one(
     problem = measurable(path, form="sparse")
     for bad in (lam[:-1], np.where(lam > 0, np.nan, lam), *([lam] if named == "mine" else [])):
         np.savez(tmp_path / "answer.npz", x=np.zeros(216), lam=bad)
-        problem.give(named, tmp_path / "answer.npz")
-    assert (problem.reference.route, len(problem.given)) == (f"{named}, refined", named == "mine")
+        problem.add_candidate(named, tmp_path / "answer.npz")
+    assert (problem.reference.route, len(problem.first)) == (f"{named}, refined", named == "mine")
     assert problem.reference.bound_mm < 1e-9
 
 

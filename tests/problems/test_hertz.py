@@ -64,7 +64,7 @@ def hertz(elements: int) -> Contact:
 
     answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
     assert answer.status == "solved"
-    known = best_of_candidates(data, load, given=[("newton", answer.lam)])
+    known = best_of_candidates(data, load, first=[("newton", answer.lam)])
     assert known.bound_mm < 1e-10
     assert abs(known.x - np.asarray(answer.x)).max() < 1e-10
     assert 5 < known.active.sum() < len(top) - 3

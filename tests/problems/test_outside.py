@@ -37,7 +37,7 @@ def solved(name: str) -> tuple[Reference, float]:
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
     assert answer.status == "solved"
-    known = best_of_candidates(data, load, given=[("newton", answer.lam)])
+    known = best_of_candidates(data, load, first=[("newton", answer.lam)])
     judged = judge(data, load, known, np.asarray(answer.x), np.asarray(answer.lam), 1e-7)
     assert judged.verdict == "within"
     assert judged.objective is not None

@@ -78,20 +78,20 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "total.subtract_small(row_panels(self.A), _longest(self.A), dlam)": ("pass",),
         "row_panels(self.A), _longest(self.A), lam": ("row_panels(self.A), 1, lam",),
         "w = z / scale": ("w, scale = z, 1.0",),
-        "found += gamma(2 * len(z)) * self.stiffest * length(w) ** 2": ("pass",),
+        "square += gamma(2 * len(z)) * self.stiffest * length(w) ** 2": ("pass",),
         "gamma(2 * len(z)) * self.stiffest": ("gamma(2 * len(z))",),
         "self.D * self.assembly.K.multiply(self.D * w)": ("self.assembly.K.multiply(w)",),
         "return float(s - SAFE * away)": ("return float(s)", "return float(s - away / 2)"),
         ">= SMALLEST:\n            return": (">= 0:\n            return",),
         "away is not None and": ("away is None or",),
         "return min((_of_block": ("return max((_of_block",),
-        "sigma2 = found - SAFE * gamma(longest + 1) * float((size.T @ (size @ ones)).max())": (
-            "sigma2 = found",
+        "sigma2 = least - SAFE * gamma(longest + 1) * float((size.T @ (size @ ones)).max())": (
+            "sigma2 = least",
         ),
         "return sigma2 if sigma2 >= SMALLEST else 0.0": ("return sigma2",),
     },
     "harness/verification/proof.py": {
-        "self.bounds(x2, lam2, r, s, quick)": ("self.bounds(x2, lam2, r, s)",),
+        "self.bounds(x2, lam2, r, s, sharpness)": ("self.bounds(x2, lam2, r, s)",),
         "np.minimum(reach, np.sqrt(self.compliance))": (
             "np.sqrt(self.compliance)",
             "np.minimum(reach, self.compliance)",
@@ -155,9 +155,9 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "harness/verification/closed_contacts.py": {
         "C = C & ~negative": ("C = C",),
-        "u - near.product(t * near.R)": ("u",),
+        "u - inverse.product(t * inverse.R)": ("u",),
         "(v / self.R)[self.M.order]": ("v[self.M.order]",),
-        "0.0, u - lam) * near.R": ("0.0, u - lam)",),
+        "0.0, u - lam) * inverse.R": ("0.0, u - lam)",),
     },
     "harness/verification/assess.py": {
         "SAFE * near + ": ("",),

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from harness.verification.assess import assess
 from harness.verification.enclosure import DoubleDouble, Enclosure
-from harness.verification.proof import Proof
+from harness.verification.proof import Proof, Sharpness
 from harness.verification.reference import proof_of
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.compliance import ApproximateInverse
@@ -50,7 +50,7 @@ def bound(
     lo: float = 0.0,
     s: float = 0.0,
     r: float = 0.0,
-    translated: bool = False,
+    sharpness: Sharpness = Sharpness.PLAIN,
 ) -> float:
     """Of x and λ as they are. lo : the second half of x; s, r : uncertainties of gap and force, mm and N."""
     units, one = proof.balanced, proof.balanced.load([load])
@@ -59,7 +59,7 @@ def bound(
     force, gap = units.residuals(one, at, forces)
     force = Enclosure(force.value, force.error + r * units.D)
     gap = Enclosure(gap.value, gap.error + s * units.R)
-    return float(proof.bounds(at, forces, force, gap, compliant=translated, translated=translated)[0][0])
+    return float(proof.bounds(at, forces, force, gap, sharpness)[0][0])
 
 
 #: Springs of 4 and 16 N/mm; x* = (1, 2), λ* = 6 N.
@@ -142,17 +142,17 @@ def test_what_is_not_known_of_the_residuals_counts(kind: Any) -> None:
 def test_a_gap_is_closed_by_a_translation(share: float) -> None:
     """By that share of it, the rest through ‖K‖/σ²; both count, and of a softer K neither does."""
     proof, _ = springs(np.asfortranarray, 4.0, 16.0)
-    exact = proof.near.product
-    object.__setattr__(proof.near, "product", lambda v: share * exact(v))
+    exact = proof.inverse.product
+    object.__setattr__(proof.inverse, "product", lambda v: share * exact(v))
     proof.kappa = 1 / 16
     at = array(1.001, 2.0), array(5.996)
-    assert 1e-3 * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 1.05e-3
-    assert 2e-3 * (1 - 1e-12) <= bound(proof, LOAD, *at, s=1e-3, translated=True) <= 2.1e-3
+    assert 1e-3 * (1 - 1e-12) <= bound(proof, LOAD, *at, sharpness=Sharpness.TRANSLATED) <= 1.05e-3
+    assert 2e-3 * (1 - 1e-12) <= bound(proof, LOAD, *at, s=1e-3, sharpness=Sharpness.TRANSLATED) <= 2.1e-3
     proof.balanced.__dict__["stiffest"] = 4.0
     wider = 1e-3 * (share + 2 * (1 - share))
-    assert wider * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 1.05 * wider
+    assert wider * (1 - 1e-12) <= bound(proof, LOAD, *at, sharpness=Sharpness.TRANSLATED) <= 1.05 * wider
     proof.compliance = 1e9  # then it is D/√κ
-    assert 4 * wider * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 4.15 * wider
+    assert 4 * wider * (1 - 1e-12) <= bound(proof, LOAD, *at, sharpness=Sharpness.TRANSLATED) <= 4.15 * wider
 
 
 def test_a_corrected_answer_is_proven_by_the_compliance(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -73,7 +73,7 @@ def test_wrong_forces_are_corrected(seed: int) -> None:
     wrong = lam.copy()
     wrong[np.flatnonzero(lam > 0)[0]], wrong[np.flatnonzero(lam == 0)[0]] = 0.0, 50.0
     for given in (wrong, lam[::-1].copy(), -lam, np.full_like(lam, 1e3)):
-        found = best_of_candidates(made, load, given=[("mine", given)])
+        found = best_of_candidates(made, load, first=[("mine", given)])
         np.testing.assert_array_equal(found.active, lam > 0)
         np.testing.assert_allclose(found.x, x, atol=1e-10)
         assert found.bound_mm < 1e-12
