@@ -203,7 +203,7 @@ class Page:
 def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
     """PASS or FAIL, the largest gap with its place, and how sure that is."""
     k = int(answer.gap.argmax())
-    gap, place = float(answer.gap[k]), position(*places[k])
+    gap, place = float(answer.gap[k]), position(places[k], places)
     e = answer.error_mm
     sure = "…" if e is None else f"every gap within {e:.1e} mm, proven" if np.isfinite(e) else "not proven"
     untold = e is not None and not abs(gap - limit_mm) > e

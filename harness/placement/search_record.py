@@ -86,7 +86,7 @@ def sentence_on(result: Found, goal: Goal, nodes: Matrix) -> tuple[str, bool]:
     if step.gap_mm <= goal.limit_mm:
         return f"PASS: {words}, proven.", True
     worst = step.worst if sample is None else sample.numbers[step.worst]
-    at = position(*nodes[step.outcome.contact[step.worst]])
+    at = position(nodes[step.outcome.contact[step.worst]], nodes)
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
         words += f"; in {share} it is {step.gap_mm:.3g} mm"

@@ -93,6 +93,8 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     _set_options(data["solver"], change.options, faults)
     if faults:
         raise InputError(faults)
+    if data["scenes"] != suite.scenes or data["solver"] != suite.model_dump(exclude_none=True)["solver"]:
+        data.pop("description", None)  # it is of the whole suite
     return suite_from(data, Path("command line"))
 
 

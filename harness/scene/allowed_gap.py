@@ -129,7 +129,7 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
     if exceed:
         kind, worst, often = "fail", result.cases.iloc[0], int(np.argmax(result.shares))
         contacts = f"{np.count_nonzero(result.shares)} of {counted(len(result.shares), 'contact')}"
-        at = "" if series.nodes is None else f", {position(*series.nodes[often])}"
+        at = "" if series.nodes is None else f", {position(series.nodes[often], series.nodes)}"
         said.append(
             f"FAIL: the gap is larger than {allowed_mm:g} mm in {exceed} of {cases} "
             f"({exceed / answered:.1%}), at {contacts}, most often ({result.shares[often]:.1%}) at contact "

@@ -98,7 +98,7 @@ def _place(problem: ReferenceProblem, x: Vector) -> str:
     assembly = problem.prepared.assembly
     nodes = assembly.asked_nodes
     worst = int(np.argmax(assembly.at_junction(abs(x - problem.reference.x))))
-    return f"at entry {worst}" if nodes is None else f"at {position(*nodes[worst])}"
+    return f"at entry {worst}" if nodes is None else f"at {position(nodes[worst], nodes)}"
 
 
 def read_answer(path: Path) -> dict[str, Vector]:

@@ -1,4 +1,4 @@
-"""What a section of the report consists of: text, tables and figures."""
+"""Sections of a report, and their blocks: text, tables and figures."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ class Text:
     """A paragraph, list or heading in Markdown."""
 
     kind: ClassVar[str] = "text"
+    files: ClassVar[tuple[str, ...]] = ()
     markdown: str
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table as shown. `show` turns a row of the data into the text of a cell."""
+    """A column of a table as shown. show : turns a row of the data into the text of a cell."""
 
     heading: str
     show: Callable[[Mapping[str, Any]], str]
@@ -40,7 +41,7 @@ def word(heading: str, name: str) -> Column:
 
 
 def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """The lines of a frame as dictionaries."""
+    """The rows of a frame as dictionaries."""
     return frame.to_dict("records")  # type: ignore[return-value]
 
 
@@ -48,8 +49,8 @@ def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 class Table:
     """A table: its `columns` in the report, all of `data` with all digits in NAME.csv beside it.
 
-    More than WIDEST columns continue in further tables, each of which begins with the first `keys` columns.
-    Without a name it has no CSV file.
+    More than WIDEST columns continue in further tables; each begins with the first `keys` columns. Names are
+    unique in a report. A table without one has no CSV file.
     """
 
     kind: ClassVar[str] = "table"
@@ -58,6 +59,11 @@ class Table:
     data: pd.DataFrame
     columns: list[Column]
     keys: int = 1
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The file beside the report, if the table has a name."""
+        return (f"{self.name}.csv",) if self.name else ()
 
     @property
     def markdown(self) -> str:
@@ -76,8 +82,8 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, saved as NAME.png; `caption` explains it. data : what it shows, in NAME.csv, if no table
-    has it.
+    """A picture, saved as NAME.png; `caption` explains it. data : the values drawn, for NAME.csv; None if a
+    table of the report has them.
     """
 
     kind: ClassVar[str] = "figure"
@@ -87,12 +93,23 @@ class Figure:
     data: pd.DataFrame | None = None
 
     @property
+    def files(self) -> tuple[str, ...]:
+        return (f"{self.name}.png",) + ((f"{self.name}.csv",) if self.data is not None else ())
+
+    @property
     def alt(self) -> str:
-        """What the picture shows, without markup: the emphasised beginning of its caption."""
+        """The emphasised beginning of the caption, without markup."""
         return self.caption.split("*")[1].rstrip(".:") if self.caption.startswith("*") else self.name
 
 
 Block = Text | Table | Figure
+
+
+def facts_table(name: str, caption: str, facts: Mapping[str, object]) -> Table:
+    """A table of names and values; those that are empty or None are left out."""
+    lines = [(what, value) for what, value in facts.items() if value not in ("", None)]
+    data = pd.DataFrame(lines, columns=["what", "value"])
+    return Table(name, caption, data, [word("what", "what"), word("value", "value")])
 
 
 @dataclass(frozen=True)

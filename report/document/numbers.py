@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 MISSING = "–"
+ROUNDING = 2.0**-44  # of the largest value: what is smaller is rounding
 
 
 def significant(value: object, digits: int = 3) -> str:
@@ -23,9 +27,18 @@ def significant(value: object, digits: int = 3) -> str:
     return f"{rounded:.{max(0, digits - 1 - exponent)}f}"
 
 
-def position(*coordinates: float) -> str:
-    """'(1077.93, 0) mm', to the hundredth: places of a part of metres are told apart, and rounding is 0."""
-    return f"({', '.join(f'{round(float(value), 2) + 0.0:.10g}' for value in coordinates)}) mm"
+def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:
+    """'(1077.93, 0) mm', to 0.01 mm; on nodes within less than a metre, to 1e-5 of their extent."""
+    extent = float(np.ptp(nodes, axis=0).max())
+    decimals = max(2, 5 - math.ceil(math.log10(extent))) if extent > 0 else 2
+    return f"({', '.join(f'{round(float(value), decimals) + 0.0:.10g}' for value in place)}) mm"
+
+
+def extent(values: NDArray[np.float64]) -> str:
+    """'0.012 … 0.73': the least and the largest value. Zero, where the least is but rounding."""
+    least, largest = float(values.min()), float(values.max())
+    rounding = abs(least) <= ROUNDING * abs(largest)
+    return f"{significant(0.0 if rounding else least)} … {significant(largest)}"
 
 
 def power(value: object, digits: int = 3) -> str:
@@ -85,3 +98,8 @@ def spread(name: str) -> Callable[[Mapping[str, Any]], str]:
 def counted(number: int, word: str) -> str:
     """'1 scene', '2 scenes'."""
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def out_of(number: int, whole: int, word: str) -> str:
+    """'2 of 60 rows', 'none of 60 rows'."""
+    return f"{number or 'none'} of {counted(whole, word)}"

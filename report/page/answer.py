@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.document.numbers import counted, listed, position, significant
+from report.document.numbers import listed, out_of, position, significant
 from report.page.write import Data, banner
 from report.results.answer_record import Answer, fasteners, pair_name
 from report.results.series_results import Array
@@ -38,7 +38,6 @@ def facts(record: Data) -> list[list[str]]:
         "error bound, mm": record.get("error_bound_mm"),
         "gaps proven to, mm": (record.get("allowed_gap") or {}).get("uncertainty_mm"),
         "mesh error, mm (estimated)": (record.get("grid") or {}).get("error_mm"),
-        "unusual": "; ".join(record.get("unusual", ())) or None,
         "memory, MiB": record.get("peak_rss_mib"),
         **{f"{step}, s": seconds for step, seconds in record.get("steps", {}).items()},
     }
@@ -60,7 +59,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     pair = next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
     at = f"contact {worst}"
     if "contact_nodes" in arrays:
-        at = position(*arrays["contact_nodes"][worst])
+        at = position(arrays["contact_nodes"][worst], arrays["contact_nodes"])
     largest = f"the largest gap left is {significant(gap[worst])} mm, at {at} ({pair_name(pair)})"
     check = record.get("allowed_gap")
     if check is None:
@@ -71,7 +70,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     if check["exceeded"] is None:
         kind, verdict = "", f"CANNOT BE TOLD: {limit}, gaps are proven to {check['uncertainty_mm']:.1e} mm"
     elif check["exceeded"]:
-        larger = f"at {len(check['contacts'])} of {counted(record['m'], 'contact')}"
+        larger = f"at {out_of(len(check['contacts']), record['m'], 'contact')}"
         where = f"{larger}, {check['share']:.1%} of the junction, between {', '.join(check['pairs'])}"
         kind, verdict = "fail", f"FAIL: {limit}, exceeded {where}"
     else:
@@ -92,6 +91,7 @@ def _banner(records: list[Data]) -> Data:
     rows = pd.DataFrame([{name: record.get(name) for name in CODE} for record in records])
     rows = rows.assign(**{name: rows[name].fillna("") for name in CODE if name != "clean"})
     changed = (rows["clean"] == 0).any()
-    warned = ["Computed with uncommitted changes to that commit."] if changed else []
+    warned = [f"{sentence}." for record in records for sentence in record.get("unusual", ())]
+    warned += ["Computed with uncommitted changes to that commit."] if changed else []
     methods = dict.fromkeys(str(record["method"]) for record in records)
     return banner(rows, counts=f"solved by: {listed(list(methods))}", warnings=warned)

@@ -57,7 +57,7 @@ def banner(rows: pd.DataFrame, **more: object) -> Data:
     lines = {
         "machines": [name or "not recorded" for name in rows["machine"].unique()],
         "commits": commits_text(rows) if len(rows) else "",
-        "measured": " to ".join(dict.fromkeys([_minute(times[0]), _minute(times[-1])])) if times else "",
+        "measured": " to ".join(dict.fromkeys([minute(times[0]), minute(times[-1])])) if times else "",
         "versions": [],
         "counts": "",
         "warnings": [],
@@ -65,7 +65,7 @@ def banner(rows: pd.DataFrame, **more: object) -> Data:
     return lines | more
 
 
-def _minute(time: str) -> str:
+def minute(time: str) -> str:
     return f"{time[:16].replace('T', ' ')} UTC"
 
 

@@ -1,4 +1,4 @@
-"""What the directory of a series of load cases holds, and statistics of the gaps that remain.
+"""The directory of a series of load cases, read, and statistics of the gaps that remain.
 
 The gaps stay on disk and are read in pieces, so that memory grows with the number of cases only by a few
 figures per case. Quantiles are exact (numpy's, linear between order statistics) except for the rounding of
@@ -34,8 +34,8 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Series:
-    """A series. cases : those with an answer, in order; gaps : (cases, m), mm, on disk; code : the `commit`
-    of each case, and whether it was `clean`.
+    """A series. cases : the answered ones, in order; gaps : (cases, m), mm, on disk; code : the `commit` of
+    each case, and whether it was `clean`.
     """
 
     facts: dict[str, Any]
@@ -46,6 +46,11 @@ class Series:
     fasteners: Array
     swept: list[str]
     code: pd.DataFrame
+
+    @property
+    def marks(self) -> dict[str, list[list[float]]]:
+        """The fasteners for a map of the junction."""
+        return {"fasteners": self.fasteners.tolist()} if len(self.fasteners) else {}
 
     def of_contacts(self, step: int = 1) -> Iterator[Array]:
         """The gaps of every step-th contact in pieces: (cases, some contacts), mm."""
@@ -63,7 +68,7 @@ class Series:
 
 
 def read(directory: Path) -> Series:
-    """Raises InputError if the file is damaged."""
+    """Read a directory. Raises InputError if its file is damaged."""
     facts = quoted(series_file.read_facts(directory))
     count = facts["cases"]  # an earlier, longer series may have left others
     rows: dict[int, tuple[Any, ...] | None] = {}
@@ -119,12 +124,12 @@ def convergence(series: Series) -> pd.DataFrame:
 
     largest = series.cases["max_gap_mm"].to_numpy()
     counts = np.unique(np.geomspace(min(10, len(largest)), len(largest), 25).astype(int))
-    found = []
+    lines = []
     for count in counts:
         values = np.sort(largest[:count])
         for q in QUANTILES[1:]:
             low, high = (int(rank) for rank in binom.interval(CONFIDENCE, count, q))
             enough = low >= 1 and high < count
             interval = (values[low - 1], values[high]) if enough else (np.nan, np.nan)
-            found.append((count, q, np.quantile(values, q), *interval))
-    return pd.DataFrame(found, columns=["cases", "quantile", "gap_mm", "low_mm", "high_mm"])
+            lines.append((count, q, np.quantile(values, q), *interval))
+    return pd.DataFrame(lines, columns=["cases", "quantile", "gap_mm", "low_mm", "high_mm"])

@@ -12,7 +12,7 @@ import pandas as pd
 
 from harness.results.schema import VERDICTS
 from report.analysis.checks import commits_text
-from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
+from report.document.blocks import Block, Column, Section, Table, Text, facts_table, number, records, word
 from report.document.escape import file_name, plain
 from report.document.numbers import MISSING, as_number, listed, power, significant, tidy_power, whole
 from report.results.reader import Results
@@ -123,13 +123,12 @@ def machine(results: Results) -> Section | None:
         "commit": commits_text(rows),
         "measured": f"{times[0]} to {times[-1]}" if times else "",
     }
-    known = pd.DataFrame([{"what": name, "value": value} for name, value in facts.items() if value])
-    found = rows.groupby("solver")[["solver_version", "solver_code"]].agg(_values)
-    found = found.reindex(in_order(rows, "solver")).reset_index()
+    solvers = rows.groupby("solver")[["solver_version", "solver_code"]].agg(_values)
+    solvers = solvers.reindex(in_order(rows, "solver")).reset_index()
     columns = [word("solver", "solver"), word("version", "solver_version"), word("code", "solver_code")]
     blocks: list[Block] = [
-        Table("machine", "*The machine.*", known, [word("what", "what"), word("value", "value")]),
-        Table("versions", "*The solvers*, with a fingerprint of the code that calls them.", found, columns),
+        facts_table("machine", "*The machine.*", facts),
+        Table("versions", "*The solvers*, with a fingerprint of the code that calls them.", solvers, columns),
         Text(MEANING),
     ]
     return Section("Machine and method", blocks)

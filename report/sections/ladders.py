@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 
 from harness.results.schema import LADDERS, OWNERS
 from report.document.blocks import Block, Figure, Section, Table, Text, number, records, word
-from report.document.numbers import as_number, counted, power, whole
+from report.document.numbers import as_number, out_of, power, whole
 from report.figures.line_charts import Cell, Group, grid
 from report.figures.style import BLUE, VERMILLION
 from report.results.reader import Results
@@ -142,7 +142,7 @@ def claims(cells: pd.DataFrame) -> str:
     """How often a wrong answer is reported as solved."""
     wrong = cells["outcome"] == WRONG_CLAIMED
     counts = [
-        f"{wrong[of].sum()} of {counted(int(of.sum()), 'row')} of {whose}"
+        f"{out_of(wrong[of].sum(), of.sum(), 'row')} of {whose}"
         for owner, whose in zip(OWNERS, ("our solvers", "textbook methods", "libraries"), strict=True)
         if (of := cells["owner"] == owner).any()
     ]

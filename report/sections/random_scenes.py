@@ -9,7 +9,7 @@ import pandas as pd
 from harness.results.schema import ANSWERED
 from report.analysis.standings import best_tolerances, shown
 from report.document.blocks import Block, Column, Figure, Section, Table, number, word
-from report.document.numbers import power, whole
+from report.document.numbers import counted, power, whole
 from report.figures import style
 from report.figures.line_charts import against_contacts, entries, styles_of
 from report.results.reader import Results
@@ -44,7 +44,7 @@ def _figure(cells: pd.DataFrame, whose: str = "") -> Figure:
     drawing, panels = style.panels(cells["n"].nunique(), PANEL, entries(cells, styles))
     for axes, (n, of_size) in zip(panels, cells.groupby("n"), strict=True):
         against_contacts(axes, of_size, styles)
-        axes.set_title(f"n = {n:.0f}, {of_size['scene'].nunique()} scenes", pad=5)
+        axes.set_title(f"n = {n:.0f}, {counted(of_size['scene'].nunique(), 'scene')}", pad=5)
     axes.set_xlabel("closed contacts")
     caption = f"*Seconds of every solve* (set-up + solve) against the closed contacts{whose}."
     return Figure("drawn", caption, drawing)

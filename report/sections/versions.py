@@ -11,7 +11,7 @@ from report.analysis.comparison import MISSING, WORSE, compared
 from report.analysis.standings import seconds_text
 from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import QUOTED, file_name, short
-from report.document.numbers import counted, power, tidy_power, whole
+from report.document.numbers import counted, out_of, power, tidy_power, whole
 from report.results.reader import Results
 from report.results.rows import cells_of, form_place
 
@@ -51,7 +51,7 @@ def _blocks(solver: str, cells: pd.DataFrame) -> list[Block]:
         word("verdict", "verdict"),
         word("against the version above", "against"),
     ]
-    count = f"{worse.sum()} of {counted(compared, 'measurement')} became worse"
+    count = f"{out_of(worse.sum(), compared, 'measurement')} became worse"
     count += f", {counted(int(lost.sum()), 'measurement')} without an answer" if lost.any() else ""
     blocks: list[Block] = [Table(f"versions-{file_name(solver)}", f"*{solver}*: {count}.", cells, columns)]
     failed = records(cells[cells["status"].isin(["failed", "crashed"]) & (cells["message"] != "")])

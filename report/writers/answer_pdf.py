@@ -1,4 +1,4 @@
-"""One page to file: the answer of a scene, its pictures, how sure it is, from what and by which version."""
+"""Writes an answer on one A4 page: verdict, pictures, error bound, origin."""
 
 from __future__ import annotations
 
@@ -13,30 +13,35 @@ from report.document.escape import plain
 from report.document.numbers import position, significant
 from report.figures import style
 from report.page.answer import facts, headline
+from report.page.write import minute
 from report.results.answer_record import fasteners
 from report.results.series_results import Array
 
 A4 = (8.27, 11.69)  # inches
 LEFT, WIDTH, TOP, LINE, LOWEST = 0.07, 0.86, 0.965, 0.0145, 0.03  # of the page
 TALLEST = 0.3  # of a picture
-COLOURS = {"pass": style.GREEN, "fail": style.VERMILLION, "": style.BLACK}
+COLOURS = {"pass": style.BLUE, "fail": "#B3261E", "": style.BLACK}  # as in page.css
 LETTERS = 105  # of a line
 
 
 def write_pdf(path: Path, record: dict[str, Any], arrays: dict[str, Array], pictures: list[Path]) -> None:
-    """A4, with those pictures below the headline; of the fasteners, as many as fit."""
-    page, found = _Page(), headline(record, arrays)
+    """A4, with those pictures below the headline, and as many of the fasteners as fit."""
+    page, verdict = _Page(), headline(record, arrays)
     page.text(str(record["title"]), size=13, weight="bold", letters=70)
-    page.text(found["text"], size=11, weight="bold", color=COLOURS[found["kind"]], letters=85)
+    page.text(verdict["text"], size=11, weight="bold", color=COLOURS[verdict["kind"]], letters=85)
+    for sentence in record.get("unusual", ()):
+        page.text(f"{sentence}.", color=COLOURS["fail"])
     for file in pictures:
         page.picture(file)
-    known = [("scene", f"{record['scene']}, key {record['scene_key'][:16]}"), *facts(record)]
-    known += [(name, str(record[name])) for name in ("commit", "machine", "recorded_at") if record.get(name)]
+    origin = [("scene", f"{record['scene']}, key {record['scene_key'][:16]}"), *facts(record)]
+    origin += [(name, str(record[name])) for name in ("commit", "machine") if record.get(name)]
+    if record.get("recorded_at"):
+        origin.append(("computed", minute(record["recorded_at"])))
     forces = [
-        f"{kind}, {contact}, at {position(x, y)}: {significant(force)} N"
+        f"{kind}, {contact}, at {position((x, y), arrays['nodes'])}: {significant(force)} N"
         for kind, contact, x, y, force in fasteners(record).itertuples(index=False)
     ]
-    room = page.lines_left - len(known) - 4
+    room = page.lines_left - len(origin) - 4
     if forces:
         page.text("Forces in the fasteners", weight="bold")
         for line in forces[:room]:
@@ -45,13 +50,13 @@ def write_pdf(path: Path, record: dict[str, Any], arrays: dict[str, Array], pict
             page.text(f"and {len(forces) - room} more: answer.md")
     page.text("How sure it is, and from what", weight="bold")
     page.text(f"{record['grid']['said']}.")
-    for name, value in known:
+    for name, value in origin:
         page.text(f"{name}: {value}")
     page.figure.savefig(path, format="pdf", dpi=style.DPI)
 
 
 class _Page:
-    """Filled from the top."""
+    """A page that is filled from the top."""
 
     def __init__(self) -> None:
         self.figure, self.at = Figure(figsize=A4), TOP

@@ -1,5 +1,5 @@
-"""Writes the answer of one scene: answer.md, a PNG per field, CSV files of the nodal results, VTU, a page in
-HTML with the maps, and one of PDF to file.
+"""Writes the answer of one scene: Markdown with pictures, CSV files of the nodal results, VTU, a page in HTML
+with maps, and one page of PDF.
 """
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
-from report.document.escape import csv_frame
-from report.document.numbers import significant
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
+from report.document.numbers import extent, significant
 from report.figures.answer_maps import answer_figures
 from report.figures.junction_maps import grid_of
 from report.page.answer import answer_data, facts, headline
@@ -44,8 +43,6 @@ def write(directory: Path) -> Path:
     check = record.get("allowed_gap") or {}
     if check.get("contacts"):
         files["exceeding"] = files["contacts"].iloc[check["contacts"]]
-    for name, table in files.items():
-        csv_frame(table).to_csv(directory / f"{name}.csv", index=False)
     blocks: list[Block] = []
     figures, vtu = {}, "not written: the nodes have no coordinates"
     if "nodes" in arrays:
@@ -54,12 +51,8 @@ def write(directory: Path) -> Path:
     drawn = {name: Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()}
     blocks += [drawn.pop(name) for name in ("gap", "section", "deformed") if name in drawn]
     blocks += [*_fields(record, arrays), *drawn.values()]
-    known = pd.DataFrame(facts(record), columns=["what", "value"])
-    of_grid = record["grid"]["said"]
-    sure: list[Block] = [
-        Text(f"{_proven(record)} {of_grid}."),
-        Table("", "*The solve.*", known, [word("what", "what"), word("value", "value")]),
-    ]
+    mesh_error = Text(f"{_proven(record)} {record['grid']['said']}.")
+    sure: list[Block] = [mesh_error, facts_table("", "*The solve.*", dict(facts(record)))]
     links = ", ".join(f"[{name}.csv]({name}.csv)" for name in files)
     blocks.append(Text(f"Every value: {links}, `solution.npz`. VTU for ParaView: {vtu}."))
     title = str(record["title"])
@@ -67,8 +60,9 @@ def write(directory: Path) -> Path:
     sections = [Section("The answer", blocks), Section("How sure it is", sure)]
     if skipped := _skipped(record):
         sections.append(Section("What was skipped", skipped))
-    first = [f"**{headline(record, arrays)['text']}**"]
-    page = written(directory / "answer.md", title, sections, first)
+    verdict = [f"**{headline(record, arrays)['text']}**"]
+    verdict += [f"> **Warning.** {sentence}." for sentence in record.get("unusual", ())]
+    page = written(directory / "answer.md", title, sections, verdict, files)
     pictures = [directory / f"{name}.png" for name in ("gap", "section") if name in figures]
     write_pdf(directory / "answer.pdf", record, arrays, pictures)
     return page
@@ -117,7 +111,7 @@ def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
 
 
 def _range(heading: str, name: str) -> Column:
-    return Column(heading, lambda row: f"{significant(row[name].min())} … {significant(row[name].max())}")
+    return Column(heading, lambda row: extent(row[name]))
 
 
 def _skipped(record: dict[str, Any]) -> list[Block]:

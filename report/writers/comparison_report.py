@@ -145,7 +145,7 @@ def _banner(rows: pd.DataFrame) -> Data:
     if rows["machine"].nunique() > 1:
         warned.append("The rows come from several machines; times are compared within one machine only.")
     code = "; ".join(f"{side}: {commits_text(of_side)}" for side, of_side in sides)
-    return banner(rows, commits=code, counts=f"{len(rows)} rows", warnings=warned)
+    return banner(rows, commits=code, counts=counted(len(rows), "row"), warnings=warned)
 
 
 def _line(line: dict[str, Any]) -> Data:

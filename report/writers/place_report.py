@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.ticker import MaxNLocator
 
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
 from report.document.numbers import counted, significant, whole
 from report.figures import style
@@ -19,7 +19,7 @@ from report.figures.junction_maps import Map, drawn, rooted
 from report.results.series_results import read as read_series
 from report.writers.sections_writer import emptied, written
 
-#: How a plan came about: what a line of the table and of the picture is called, and its look.
+#: How a plan came about: its name in the table and the picture, and its look.
 FAMILIES = {
     "all candidates": ("all candidates", style.BLACK, "o", ""),
     "removal": ("after removal", style.BLUE, ".", "-"),
@@ -48,7 +48,7 @@ def _summary(record: dict[str, Any]) -> Table:
     best, limit = record["best"], record["limit_mm"]
     share = f"{100 * record['share']:.4g} % of the cases"
     asked = f"the best {record['count']}" if record["count"] else f"the fewest that leave {limit:g} mm"
-    known = {
+    facts = {
         "asked for": f"{asked} in {share}",
         "candidates": f"{len(record['candidates'])} holes, {significant(record['preload'])} N each",
         "found": record["said"],
@@ -58,25 +58,24 @@ def _summary(record: dict[str, Any]) -> Table:
         said = f"{counted(sample['fasteners'], 'fastener')}: kept by {sample['kept']}, with "
         said += f"{100 * record['confidence']:g} % confidence {low} to {high} % of all"
         which = f"; beyond the limit in cases {', '.join(map(str, failing))}" if failing else ""
-        known[f"{sample['cases']} fresh cases, round {n}"] = said + which
+        facts[f"{counted(sample['cases'], 'fresh case')}, round {n}"] = said + which
     if best is not None:
-        known["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
-        known["lower bound"] = "none is known: this is the best plan found"
-    lines = pd.DataFrame(known.items(), columns=["what", "value"])
-    return Table("", "*The question and its answer.*", lines, [word("what", "what"), word("value", "value")])
+        facts["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
+        facts["lower bound"] = "none is known: this is the best plan found"
+    return facts_table("", "*The question and its answer.*", facts)
 
 
 def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
-    """Of each family of plans, the smallest that keeps the limit; of one size, the best."""
+    """The smallest plan of each family that keeps the limit; of one size, the best."""
     limit = np.inf if record["limit_mm"] is None else record["limit_mm"]
     lines = []
     for name, (text, *_) in FAMILIES.items():
-        own = steps[steps["moved"] == name].sort_values(["fasteners", "gap_mm"])
+        plans = steps[steps["moved"] == name].sort_values(["fasteners", "gap_mm"])
         if record["count"]:
-            own = own[(own["fasteners"] == record["count"]) | (name in ("own", "all candidates"))]
-        kept = own if record["count"] else own[own["gap_mm"] <= limit]
-        if len(own):
-            most = own[own["fasteners"] == own["fasteners"].max()]
+            plans = plans[(plans["fasteners"] == record["count"]) | (name in ("own", "all candidates"))]
+        kept = plans if record["count"] else plans[plans["gap_mm"] <= limit]
+        if len(plans):
+            most = plans[plans["fasteners"] == plans["fasteners"].max()]
             line = (kept if len(kept) else most).iloc[0]
             lines.append({"family": text, **line[["fasteners", "gap_mm"]], "kept": line["gap_mm"] <= limit})
     columns = [word("plan", "family"), number("fasteners", "fasteners", whole), number("gap, mm", "gap_mm")]
@@ -84,8 +83,8 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
         columns.append(Column("within the limit", lambda line: "yes" if line["kept"] else "no", "left"))
     caption = (
         "*Beside plans that cost no search*, in the cases that chose. Of each kind the smallest within the "
+        "limit, or its last."
     )
-    caption += "limit, or its last."
     return Table("families", caption, pd.DataFrame(lines), columns)
 
 
@@ -93,12 +92,12 @@ def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
     drawing = style.figure(3.4)
     axes = drawing.subplots()
     for name, (text, colour, marker, line) in FAMILIES.items():
-        own = steps[steps["moved"] == name].sort_values("fasteners")
-        if len(own):
+        plans = steps[steps["moved"] == name].sort_values("fasteners")
+        if len(plans):
             look: dict[str, Any] = {"marker": marker, "linestyle": line, "color": colour, "ms": 5}
-            # What the search found may be a uniform plan, too: it stays visible.
+            # The search may have found a uniform plan, too: it stays visible.
             look |= {"ms": 9, "zorder": 2} if name == "uniform" else {"zorder": 3}
-            axes.plot(own["fasteners"], own["gap_mm"], label=text, **look)
+            axes.plot(plans["fasteners"], plans["gap_mm"], label=text, **look)
     if record["limit_mm"] is not None:
         axes.axhline(record["limit_mm"], color=style.GREY, linewidth=1, label="the limit")
     axes.set(xlabel="fasteners", ylabel="largest gap, mm", xlim=(0, None), yscale="log")
@@ -124,12 +123,9 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
         if series.nodes is None or not len(series.cases):
             return [Text("No picture: some cases have no answer.")]
         pieces = [np.quantile(some, share, axis=0) for some in series.of_contacts()]
-        shown.append((text, series.nodes, np.concatenate(pieces), series.fasteners.tolist()))
+        shown.append((text, series.nodes, np.concatenate(pieces), series.marks))
     scale = rooted("gap, mm", "viridis", *(values for _, _, values, _ in shown))
-    maps = [
-        Map(text, nodes, gap, scale, (), {"fasteners": marks} if marks else {})
-        for text, nodes, gap, marks in shown
-    ]
+    maps = [Map(text, nodes, gap, scale, (), marks) for text, nodes, gap, marks in shown]
     caption = f"*The gap at each contact that {100 * share:.4g} % of the fresh cases keep*, before and after."
     table = pd.DataFrame({"x_mm": shown[0][1][:, 0], "y_mm": shown[0][1][:, 1]})
     table = table.assign(**{f"{name}_mm": gap for name, (_, _, gap, _) in zip(names, shown, strict=True)})

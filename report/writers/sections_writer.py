@@ -1,27 +1,46 @@
-"""The writer of every report: Markdown from sections, with a PNG per figure and a CSV per table beside it."""
+"""Writes every report: Markdown from sections, with a PNG per figure and a CSV per table beside it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import jinja2
+import pandas as pd
 
 from report.document.blocks import Figure, Section, Table
 from report.document.escape import csv_frame, markdown, picture, short
 from report.figures import style
 
 
-def written(path: Path, title: str, sections: Sequence[Section], intro: Sequence[str] = ()) -> Path:
-    """Write PATH and the files of its tables and figures; returns PATH. intro : paragraphs below the
-    title.
+def written(
+    path: Path,
+    title: str,
+    sections: Sequence[Section],
+    intro: Sequence[str] = (),
+    files: Mapping[str, pd.DataFrame] = MappingProxyType({}),
+) -> Path:
+    """Write PATH and the files of its tables and figures; returns PATH.
+
+    intro : paragraphs below the title. files : tables that are not shown, by the names of their CSV files.
+    Raises ValueError, before anything is written, if two blocks would have the same file.
     """
+    sources: dict[str, str] = {}
+    for section in sections:
+        for name in (name for block in section.blocks for name in block.files):
+            if name in sources:
+                both = f"the sections {sources[name]!r} and {section.title!r}"
+                raise ValueError(f"{name} would be written by {both}: rename a table or figure of one")
+            sources[name] = section.title
     with style.applied():
-        for block in [block for section in sections for block in section.blocks]:
+        for block in (block for section in sections for block in section.blocks):
             if isinstance(block, Figure):
                 picture(block.drawing).savefig(path.parent / f"{block.name}.png", dpi=style.DPI)
             if isinstance(block, Figure | Table) and block.name and block.data is not None:
                 csv_frame(block.data).to_csv(path.parent / f"{block.name}.csv", index=False)
+    for name, table in files.items():
+        csv_frame(table).to_csv(path.parent / f"{name}.csv", index=False)
     environment = jinja2.Environment(trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string((Path(__file__).parent / "sections.md.j2").read_text("utf-8"))
     page = template.render(title=short(title, 150), sections=sections, intro=intro)

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.checks import code_warnings
-from report.document.blocks import Figure, Section, Table, Text, number, word
+from report.document.blocks import Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import file_name
-from report.document.numbers import counted, significant, tidy_power
+from report.document.numbers import counted, out_of, significant, tidy_power
 from report.figures import style
 from report.figures.junction_maps import Map, drawn, rooted
 from report.page.maps import series_maps
@@ -48,7 +48,7 @@ def write(directory: Path) -> Path:
     check = series.facts.get("allowed_gap")
     verdict = [Text(f"**{check['said'][-1]}** {' '.join(check['said'][:-1])} {WHERE}")] if check else []
     sections = [Section("Summary", [*verdict, _summary(series)])]
-    title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
+    title = f"Series on {series.facts['scene']}: {counted(series.facts['cases'], 'load case')}"
     if len(series.cases):
         maps, curve = quantile_maps(series), exceedance(series)
         with style.applied():
@@ -63,10 +63,10 @@ def write(directory: Path) -> Path:
 
 def _summary(series: Series) -> Table:
     facts, cases, identity = series.facts, series.cases, series.facts["identity"]
-    counts = ", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in series.counts.items())
-    known = {
+    verdicts = ", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in series.counts.items())
+    summary = {
         "scene": facts["title"],
-        "solved": f"{sum(series.counts.values())} of {facts['cases']} cases: {counts}",
+        "solved": f"{out_of(sum(series.counts.values()), facts['cases'], 'case')}: {verdicts}",
         "solver": f"{identity['solver']} ({identity['form']}), tolerance {tidy_power(identity['tolerance'])}",
         "machine": f"{facts['machine']}, {counted(facts['threads'], 'thread')}",
     }
@@ -75,18 +75,18 @@ def _summary(series: Series) -> Table:
         largest, seconds = cases["max_gap_mm"], cases[list(STEPS)]
         worst = int(cases["case"].to_numpy()[largest.to_numpy().argmax()])
         rate = significant(len(cases) / float(seconds.sum().sum()))
-        known |= {
+        compared = counted(len(checked), "case")
+        summary |= {
             "largest gap left": f"{significant(largest.max())} mm, in case {worst}",
             "median of the largest gaps": f"{significant(largest.median())} mm",
             "proven error bound": f"{significant(bounds.max())} mm, {len(cases) - len(bounds)} unproven",
-            "error beside the reference": f"{significant(checked.max())} mm, {len(checked)} cases compared",
+            "error beside the reference": f"{significant(checked.max())} mm, {compared} compared",
             "speed": f"{rate} cases per second of work",
         }
         for name, text in STEPS.items():
             if seconds[name].notna().any():
-                known[f"ms per case: {text}"] = significant(1e3 * seconds[name].mean())
-    lines = pd.DataFrame(known.items(), columns=["what", "value"])
-    return Table("summary", "*The series.*", lines, [word("what", "what"), word("value", "value")])
+                summary[f"ms per case: {text}"] = significant(1e3 * seconds[name].mean())
+    return facts_table("summary", "*The series.*", summary)
 
 
 def _statistics(series: Series) -> Table:
@@ -99,7 +99,7 @@ def _statistics(series: Series) -> Table:
 
 
 def _maps(series: Series, maps: Array) -> list[Figure]:
-    """Of some quantiles on one scale, and of the case with the largest gap."""
+    """Maps of some quantiles on one scale, and of the case with the largest gap."""
     nodes = series.nodes
     if nodes is None:
         return []
@@ -110,10 +110,9 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
         **{f"q{q:g}_mm": values for q, values in zip(QUANTILES, maps, strict=False)},
         "mean_mm": maps[-1],
     }
-    marks = {"fasteners": series.fasteners.tolist()} if len(series.fasteners) else {}
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
-    quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), marks) for q in MAPPED]
-    worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), (), marks)
+    quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
+    worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), (), series.marks)
     caption = "*The remaining gap at each contact: quantiles over the cases.*"
     of_worst = f"*The worst case, number {case}, with a largest gap of {significant(gap.max())} mm.*"
     return [
@@ -152,23 +151,23 @@ def _convergence(series: Series) -> Figure:
 
 
 def _swept(series: Series, key: str) -> Figure:
-    found = series.cases.groupby(key)[list(GAPS)].agg(["min", "median", "max"])
-    found.columns = ["_".join(pair) for pair in found.columns.to_flat_index()]
+    ranges = series.cases.groupby(key)[list(GAPS)].agg(["min", "median", "max"])
+    ranges.columns = ["_".join(pair) for pair in ranges.columns.to_flat_index()]
     drawing, axes = _axes()
     for (name, label), (colour, line) in zip(GAPS.items(), LOOKS, strict=False):
-        middle, low, high = (found[f"{name}_{end}"] for end in ("median", "min", "max"))
-        axes.plot(found.index, middle, line, color=colour, marker="o", markersize=3, label=label)
-        axes.fill_between(found.index, low, high, color=colour, alpha=0.15, lw=0)
+        middle, low, high = (ranges[f"{name}_{end}"] for end in ("median", "min", "max"))
+        axes.plot(ranges.index, middle, line, color=colour, marker="o", markersize=3, label=label)
+        axes.fill_between(ranges.index, low, high, color=colour, alpha=0.15, lw=0)
     axes.set(xlabel=key, ylabel="remaining gap, mm")
     drawing.legend(loc="outside right upper")
     caption = f"*The largest and the mean gap per case against {key}*, shaded: the range over the other keys."
     error = 2 * series.cases["gap_error_mm"].astype(float).max()  # NaN if one is unknown
-    if np.ptp(found[[f"{name}_{end}" for name in GAPS for end in ("min", "max")]], axis=0).max() <= error:
+    if np.ptp(ranges[[f"{name}_{end}" for name in GAPS for end in ("min", "max")]], axis=0).max() <= error:
         caption += (
             f" **{key} changes neither**, to what is proven: closed contacts carry the difference, or it "
             "acts where no gap is left."
         )
-    return Figure(f"sweep-{file_name(key)}", caption, drawing, found.reset_index())
+    return Figure(f"sweep-{file_name(key)}", caption, drawing, ranges.reset_index())
 
 
 def _axes() -> tuple[Drawing, Axes]:
@@ -177,16 +176,18 @@ def _axes() -> tuple[Drawing, Axes]:
 
 
 def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.DataFrame) -> Data:
-    """What the page of a series shows.
-
-    quantiles : (len(names), m), mm, the maps; curve : the exceedance over all contacts, as in
-    report.results.series_results.
+    """The data of the page. quantiles : (len(names), m), mm, the maps; curve : of
+    `series_results.exceedance`.
     """
     facts = series.facts
     versions = facts.get("versions") or {}
     identity = facts["identity"]
-    known = {"machine": str(facts["machine"]), "recorded_at": "", "solver": identity["solver"]}
-    rows = series.code.assign(**known, solver_code=identity.get("solver_code") or "")
+    rows = series.code.assign(
+        machine=str(facts["machine"]),
+        recorded_at="",
+        solver=identity["solver"],
+        solver_code=identity.get("solver_code") or "",
+    )
     rows["clean"] = rows["clean"].astype(float)
     check = facts.get("allowed_gap")
     return {
@@ -195,7 +196,7 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
         "banner": banner(
             rows,
             warnings=code_warnings(rows),
-            counts=f"{len(series.cases)} of {facts['cases']} load cases answered",
+            counts=f"{out_of(len(series.cases), facts['cases'], 'load case')} answered",
             versions=[f"{name} {version}" for name, version in versions.items()],
         ),
         "curves": [

@@ -1,4 +1,4 @@
-"""Writes the report of a results directory: Markdown, a PNG per figure, a CSV per table, a page in HTML."""
+"""Writes the report of a results directory: Markdown with pictures and tables, and a page in HTML."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from report.analysis.checks import warnings
 from report.document.blocks import Block, Section, Text
+from report.document.numbers import counted, listed
 from report.figures import style
 from report.page.run import run_data
 from report.page.write import write as write_page
@@ -34,18 +35,26 @@ def write(directory: Path) -> Path:
         sections = [
             section for k, part in enumerate(machines) for section in _made(part, k if machines[1:] else None)
         ]
-    intro = [str(results.suite.get("description", ""))]
+    description = results.suite.get("description") if len(results.rows) else ""
+    intro = [str(description or _measured(results))]
     intro += [f"> **Warning.** {warning}" for warning in warnings(results)]
-    if results.rows.empty:
-        intro.append("Nothing was measured: `measurements.jsonl` holds no row.")
     if len(sections) >= LONG:
         intro.append(f"Contents: {contents([section.title for section in sections])}")
     write_page(target / "index.html", results.title, run_data(results), directory)
-    return written(target / "report.md", results.title, sections, [text for text in intro if text])
+    return written(target / "report.md", results.title, sections, intro)
+
+
+def _measured(results: Results) -> str:
+    """'3 solvers on 1 scene; forms: dual and primal.'"""
+    rows = results.rows[results.rows["status"] != "unsupported"]
+    if rows.empty:
+        return "Nothing was measured."
+    counts = [counted(rows[name].nunique(), name) for name in ("solver", "scene")]
+    return f"{counts[0]} on {counts[1]}; forms: {listed(sorted(rows['form'].unique()))}."
 
 
 def contents(titles: Iterable[str]) -> str:
-    """Links to headings of these titles, in one paragraph; equal titles lead to one heading each, in turn."""
+    """Links to the headings of these titles, in one paragraph; equal titles lead to one heading each."""
     seen: Counter[str] = Counter()
     links = []
     for title in titles:
@@ -57,8 +66,8 @@ def contents(titles: Iterable[str]) -> str:
 
 
 def _made(results: Results, machine: int | None) -> list[Section]:
-    """The sections that have something to say of the results. machine : its place, if there are several; it
-    is in the titles, and from the second on in the names of files.
+    """The sections that these results have. machine : its place, if there are several; titles then name it,
+    and file names begin with its number from the second on.
     """
     parts = {about: results.about(about) for about, _ in SECTIONS}
     made = [section for about, of in SECTIONS if len(parts[about].rows) and (section := of(parts[about]))]
@@ -67,7 +76,7 @@ def _made(results: Results, machine: int | None) -> list[Section]:
     name = results.rows["machine"].iloc[0] or "machine not recorded"
     prefix = f"machine{machine + 1}-" if machine else ""
     return [
-        Section(f"{section.title}: {name}", [_renamed(each, prefix) for each in section.blocks])
+        Section(f"{section.title}: {name}", [_renamed(block, prefix) for block in section.blocks])
         for section in made
     ]
 

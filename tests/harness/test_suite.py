@@ -160,7 +160,12 @@ class TestOverrides:
         )
 
     def test_scenes_sizes_and_solvers(self, suite: Suite) -> None:
+        suite = suite.model_copy(update={"description": "Of the whole suite."})
         changed = overridden(suite, Overrides(sizes=(6112,), solvers=("gi", "exact")))
+        assert (changed.description, overridden(suite, Overrides(repeats=3)).description) == (
+            "",
+            suite.description,
+        )
         assert changed.scenes == ["6112/0120"]
         assert [(e.name, e.forms) for e in changed.solver] == [("exact", ["dual"]), ("gi", None)]
         assert overridden(suite, Overrides(scenes=("4386/00*",))).scenes == ["4386/0052"]

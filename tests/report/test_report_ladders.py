@@ -83,7 +83,7 @@ def test_the_worst_answer_is_counted_and_named(directory: Path) -> None:
 
 def test_wrong_answers_reported_as_solved_are_counted_apart(directory: Path) -> None:
     text = write(directory).read_text("utf-8")
-    assert "solved: 0 of 4 rows of our solvers, 2 of 8 rows of libraries." in text
+    assert "solved: none of 4 rows of our solvers, 2 of 8 rows of libraries." in text
     write_rows(directory, [r | (WRONG if r["solver"] == "ipm" and r["scene"] == EASY else {}) for r in ROWS])
     assert "solved: 1 of 4 rows of our" in write(directory).read_text("utf-8")
 

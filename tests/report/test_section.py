@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from report.document.numbers import extent, position
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.writers.answer_pdf import LETTERS, write_pdf
@@ -104,6 +105,8 @@ def test_the_page_to_file_is_one_page(tmp_path: Path, count: int) -> None:
     record |= {"title": "A $joint_ of " + LETTERS * "two ", "scene": "here", "scene_key": "0" * 64, "n": 42}
     record |= {"method": "newton", "fasteners": forces, "grid": {"said": "Nothing is known"}, "steps": {}}
     check = {"exceeded": True, "allowed_mm": 0.05, "contacts": [1], "share": 0.02, "pairs": ["a – b"]}
+    record |= {"unusual": ["E is unusual"], "recorded_at": "2026-01-02T03:04:05"}
+    arrays |= {"nodes": arrays["contact_nodes"]}
     record |= {"allowed_gap": check, "commit": "c0ffee"}
     figure = section_figure(record, arrays)
     assert figure is not None
@@ -112,3 +115,11 @@ def test_the_page_to_file_is_one_page(tmp_path: Path, count: int) -> None:
     content = (tmp_path / "answer.pdf").read_bytes()
     assert content.startswith(b"%PDF")
     assert len(re.findall(rb"/Type /Page\b", content)) == 1
+
+
+def test_places_are_rounded_by_the_size_of_the_part_and_a_gap_of_rounding_is_zero() -> None:
+    nodes = np.array([[1077.93456, -1e-9], [0.0, 4000.0]])
+    assert position(nodes[0], nodes) == "(1077.93, 0) mm"
+    assert position(nodes[0] / 1e3, nodes / 1e3) == "(1.0779, 0) mm"
+    assert extent(np.array([-1.1e-16, 0.73])) == "0 … 0.730"
+    assert extent(np.array([-1.1e-6, 0.73])) == "-1.10e-6 … 0.730"

@@ -11,9 +11,10 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import everything, no_answer, results, row, write_rows
 
-from report.document.blocks import WIDEST, Table, number
+from report.document.blocks import WIDEST, Section, Table, number
 from report.results.reader import read
 from report.sections import SECTIONS, accuracy, random_scenes, speed, summary, time_to_solution
+from report.writers.sections_writer import written
 from report.writers.suite_report import contents, write
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -113,3 +114,11 @@ def test_further_columns_continue_below_with_the_first_repeated() -> None:
     headings = [[cell.strip() for cell in part] for part in parts]
     assert all(part[:2] == ["c0", "c1"] and len(part) <= WIDEST for part in headings)
     assert [name for part in headings for name in part[2:]] == [f"c{k}" for k in range(2, 12)]
+
+
+def test_blocks_of_two_sections_have_no_file_in_common(tmp_path: Path) -> None:
+    data = pd.DataFrame({"a": [1]})
+    sections = [Section(title, [Table("same", "", data, [number("a", "a")])]) for title in ("One", "Two")]
+    with pytest.raises(ValueError, match=r"same\.csv would be written by the sections 'One' and 'Two'"):
+        written(tmp_path / "report.md", "Both", sections)
+    assert not [*tmp_path.iterdir()]
