@@ -12,10 +12,8 @@ from .options import error_reporting, option
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from harness.results.comparison import Side
     from report.writers.comparison_report import Comparison
 
-MAX_SLOWDOWN = 1.3
 LINES = 20  # of a table
 LEFT_OUT = ("seconds", "status")  # for whole lines on a terminal
 
@@ -25,7 +23,7 @@ def compare(
     new: Annotated[list[str], typer.Argument(metavar="NEW...", help="Those to compare with it.")],
     max_digits_lost: Annotated[float, option("N", "Digits of the error that may be lost.", min=0.0)] = 1.0,
     max_slowdown: Annotated[
-        float | None, option("FACTOR", f"Ratio of times that is allowed.  [default: {MAX_SLOWDOWN}]", min=1.0)
+        float | None, option("FACTOR", "Ratio of times that is allowed.  [default: 1.3]", min=1.0)
     ] = None,
     key: Annotated[str | None, option("KEY", "Only the row with this key.")] = None,
     out: Annotated[Path | None, option("DIR", "Write comparison.md and comparison.csv there.")] = None,
@@ -46,45 +44,17 @@ def compare(
                 5 not comparable: other problems, limits or suites; --max-slowdown on another machine.
     """
     with error_reporting() as console:
-        from harness.results.atomic_output import refuse_unwritable
-        from harness.results.comparison import read_side
-        from harness.results.records import MEASUREMENTS
+        from harness.commands.run_comparison import compare as compare_runs
         from harness.terminal import DONE, FAILED
-        from report.writers.comparison_report import write
 
-        if out:
-            refuse_unwritable(out, [Path(name) / MEASUREMENTS for name in (old, *new)])
-        before = read_side(old, key)
-        compared = [_compared(before, read_side(name, key), max_digits_lost, max_slowdown) for name in new]
-        for comparison in compared:
+        comparisons = compare_runs(
+            old, new, max_digits_lost=max_digits_lost, max_slowdown=max_slowdown, key=key, out=out
+        )
+        for comparison in comparisons:
             _show(comparison, console)
         if out:
-            console.print(f"Comparison: {write(out, compared)}")
-        raise typer.Exit(FAILED if any(each.worse for each in compared) else DONE)
-
-
-def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float | None) -> Comparison:
-    import pandas as pd
-
-    from harness.results.comparison import Incomparable, measurement, refuse_incomparable
-    from report.analysis.comparison import compared
-    from report.document.escape import quoted
-    from report.results.rows import of_records
-    from report.writers.comparison_report import Comparison
-
-    refuse_incomparable(old, new)
-    timed = len(old.machines | new.machines) == 1
-    untimed = "" if timed else "Times are not compared: they are of different machines."
-    if not timed and max_slowdown is not None:
-        allowed = f"times of one machine: {'; '.join(sorted(old.machines | new.machines))}"
-        raise Incomparable.one(new.name, "--max-slowdown", max_slowdown, allowed)
-    before, after = (
-        of_records([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)
-    )
-    table = compared(before, after, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
-    names = quoted(old.name), quoted(new.name)
-    both = pd.concat([rows.assign(side=side) for rows, side in zip((before, after), names, strict=True)])
-    return Comparison(*names, table, untimed, both)
+            console.print(f"Comparison: {out / 'comparison.md'}")
+        raise typer.Exit(FAILED if any(comparison.worse for comparison in comparisons) else DONE)
 
 
 def _show(comparison: Comparison, console: Console) -> None:

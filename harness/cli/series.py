@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import signal
-from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -26,9 +25,6 @@ from .options import (
     error_reporting,
     option,
 )
-
-if TYPE_CHECKING:
-    from problems.load_cases import LoadCases
 
 
 def series(
@@ -94,62 +90,27 @@ def series(
                 3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with error_reporting() as console:
-        from harness.measurement.scheduler import threads_per_worker
-        from harness.measurement.solver_descriptions import described
-        from harness.planning.form_choice import chosen_form
-        from harness.results.atomic_output import refuse_inputs, refuse_unwritable
-        from harness.results.schema import SERIES
-        from harness.results.series_file import read_facts
-        from harness.scene.allowed_gap import check_series, refuse_unusable
-        from harness.scene.validate import print_unusual
-        from harness.series.load_case_source import RANDOM, GapCases
-        from harness.series.run import run
-        from harness.series.session import Job
-        from harness.terminal import DONE, NOTHING_JUDGED
+        from harness.commands.load_case_series import SeriesOptions
+        from harness.commands.load_case_series import series as solve_into
+        from harness.series.load_case_source import GapCases
         from harness.terminal.console import ConsoleReporter, show_verdict
-        from problems.errors import Fault, InputError
-        from problems.load_cases.sweep import sweep as swept
-        from problems.scene_files import read_scene
 
-        refuse_unusable(allow_gap)
-        given = GapCases(cases, seed, mean, sd, correlation_length, around, gaps)
-        faults = given.faults(sweep or ())
-        if sweep and cases is not None:
-            faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        (made,) = described([(solver, {})], plugin, "--solver", ConsoleReporter(console))
-        if form and form.value not in made.forms:
-            faults.append(Fault("--form", "form", form.value, f"{solver} takes {' and '.join(made.forms)}"))
-        if not (0 < tolerance < inf and 0 < limit < inf):
-            allowed = "must be positive and finite"
-            faults.append(Fault("series", "tolerance, limit", (tolerance, limit), allowed))
-        if faults:
-            raise InputError(faults)
-        inputs = [Path(each) for each in (scene, around, gaps, plugin) if each]
-        refuse_unwritable(out, inputs)
-        refuse_inputs([out / SERIES], inputs)
-        read = read_scene(scene)
-        before = (read_facts(out) or {}).get("identity", {}).get("form")
-        asked: Any = form.value if form else before if before in made.forms else None
-        count = swept(read, sweep).count if sweep else cases or RANDOM
-        choice = chosen_form(read, made.forms, asked, count)
-        if choice.why:
-            console.print(f"In the sparse form, without condensation: {choice.why}.", style="dim")
-        taken: Any = choice.form
-        chosen: LoadCases = swept(read, sweep, taken) if sweep else given.of(read, taken)
-        print_unusual(read, console, chosen.notes)
-        limits = time_limit, memory_limit
-        threads = threads or threads_per_worker(scheduler) or (1 if taken == "sparse" else 2)
-        job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
-        facts = {"solver_version": made.version, "solver_code": made.code}
-        code = run(job, facts, out, console, scheduler)
-        verdict = None
-        if allow_gap is not None and code in (DONE, NOTHING_JUDGED):
-            verdict = check_series(out, allow_gap)
-        if read_facts(out):
-            from report.writers.series_report import write  # slow to import: not before the first row
-
-            console.print(f"Report: {write(out)}")
-        if verdict:
-            code = show_verdict(verdict["kind"], verdict["said"], console) or code
+        accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
+        taken: Any = form.value if form else None
+        outcome = solve_into(
+            scene,
+            out,
+            GapCases(cases, seed, mean, sd, correlation_length, around, gaps),
+            SeriesOptions(solver, taken, *accuracy, threads, plugin, *limits),
+            sweep=sweep or (),
+            allow_gap_mm=allow_gap,
+            scheduler=scheduler,
+            reporter=ConsoleReporter(console),
+        )
+        if outcome.report:
+            console.print(f"Report: {outcome.report}")
+        code = outcome.code
+        if outcome.sentences:
+            code = show_verdict(outcome.kind, outcome.sentences, console) or code
         raise typer.Exit(code)

@@ -87,12 +87,9 @@ def run(
                 3 nothing could be judged, 130 interrupted.
     """
     with error_reporting() as console:
-        from harness.measurement.scheduler import threads_per_worker
-        from harness.measurement.suite_run import run as run_suite
-        from harness.planning.overrides import Overrides, overridden, tolerances_of
-        from harness.planning.suite import read_suite, read_written
-        from harness.results.atomic_output import refuse_inputs
-        from harness.results.records import MEASUREMENTS
+        from harness.commands.suite_runs import run as run_suite
+        from harness.planning.overrides import Overrides, tolerances_of
+        from harness.terminal.console import ConsoleReporter
 
         change = Overrides(
             sizes=tuple(size or ()),
@@ -109,23 +106,12 @@ def run(
             reference_limit_s=reference_limit,
             plugin=plugin,
         )
-        written = Path(suite) / "suite.toml"
-        read = read_written(written) if written.is_file() else read_suite(suite)
-        chosen = overridden(read, change)
-        if not threads and "threads" not in read.model_fields_set:
-            chosen = chosen.model_copy(
-                update={"threads": [threads_per_worker(scheduler) or chosen.threads[0]]}
-            )
-        directory = out or Path("results") / chosen.name
-        if not (directory / MEASUREMENTS).exists():
-            refuse_inputs([directory / written.name], [Path(suite)])
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        code = run_suite(chosen, directory, console, scheduler, key)
-        if (directory / MEASUREMENTS).is_file():
-            from report.writers.suite_report import write  # slow to import: not before the first row
-
-            console.print(f"Report: {write(directory)}")
-        raise typer.Exit(code)
+        reporter = ConsoleReporter(console)
+        outcome = run_suite(suite, out, change, scheduler=scheduler, key=key, reporter=reporter)
+        if outcome.report:
+            console.print(f"Report: {outcome.report}")
+        raise typer.Exit(outcome.code)
 
 
 def report(
@@ -138,32 +124,9 @@ def report(
       python -m harness report results/default
     """
     with error_reporting() as console:
-        from harness.planning.suite import read_written
-        from harness.results import records
-        from harness.results.atomic_output import refuse_unwritable
-        from harness.results.row_validation import refuse_unreadable
-        from harness.results.schema import SERIES
-        from harness.results.series_file import refuse_damaged
-        from problems.errors import InputError
+        from harness.commands.suite_runs import report as write_report
 
-        if directory.is_dir():
-            refuse_unwritable(directory / "report", (), "DIR")
-        if (directory / SERIES).exists():
-            from report.writers.series_report import write as write_series
-
-            refuse_damaged(directory)
-            console.print(f"Report: {write_series(directory)}")
-            return
-        path = directory / records.MEASUREMENTS
-        if not path.is_file():
-            raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
-        refuse_unreadable(directory)
-        suite = directory / "suite.toml"
-        if suite.is_file():
-            read_written(suite)
-        from report.writers.suite_report import write
-
-        console.print(f"Report: {write(directory)}")
+        console.print(f"Report: {write_report(directory)}")
 
 
 def gate(

@@ -1,0 +1,1 @@
+"""Commands that write directories, as functions: the command line and Python both call them."""

@@ -1,0 +1,209 @@
+"""Solves many load cases on one assembly into a directory, which keeps rows, gaps, report and verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from harness.measurement.scheduler import threads_per_worker
+from harness.measurement.solver_descriptions import described
+from harness.planning.form_choice import chosen_form
+from harness.results import series_file
+from harness.results.atomic_output import refuse_inputs, refuse_unwritable
+from harness.results.records import Row
+from harness.results.schema import SERIES
+from harness.scene.allowed_gap import check_series, refuse_unusable
+from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
+from harness.series.run import run
+from harness.series.session import Job
+from harness.terminal import DONE, NOTHING_JUDGED
+from harness.terminal.console import console_of
+from harness.verification.judge import LIMIT_MM
+from problems.errors import Fault, InputError
+from problems.forms import Form
+from problems.load_cases import LoadCases
+from problems.load_cases.sweep import sweep as swept
+from problems.model.scene import JointScene
+from problems.reporter import SILENT, Reporter
+from problems.scene_files import read_scene
+
+
+@dataclass(frozen=True)
+class SeriesOptions:
+    """How the load cases of a series are solved.
+
+    Parameters
+    ----------
+    solver : str
+        Name of a solver, or of the plug-in's.
+    form : str, optional
+        "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
+    tolerance : float
+        Passed to the solver.
+    limit_mm : float
+        Limit on the displacement error, mm.
+    check : int
+        Every `check`-th case is compared with the certified reference; 0: none.
+    threads : int, optional
+        Threads for linear algebra; by default 2, in the sparse form 1.
+    plugin : Path, optional
+        A Python file with a solver. It runs in a process of its own, under the two limits below.
+    time_limit_s : float
+        Time limit per load case of a plug-in, s.
+    memory_limit_mib : int
+        Memory limit over all processes of a plug-in, MiB.
+
+    Examples
+    --------
+    >>> from rivetbench import SeriesOptions
+    >>> SeriesOptions(check=0).solver
+    'newton'
+    """
+
+    solver: str = "newton"
+    form: Form | None = None
+    tolerance: float = 1e-11
+    limit_mm: float = LIMIT_MM
+    check: int = 100
+    threads: int | None = None
+    plugin: Path | None = None
+    time_limit_s: float = 60.0
+    memory_limit_mib: int = 8192
+
+
+STANDARD = SeriesOptions()
+
+
+@dataclass(frozen=True)
+class SeriesOutcome:
+    """A series in its directory.
+
+    Parameters
+    ----------
+    directory : Path
+        Where its rows, gaps and report are.
+    code : int
+        Exit code of the command: 0 if every case is within the limit.
+    sentences : tuple of str
+        The outcome for the allowed gap in words; empty if none was asked for.
+    kind : str
+        "pass" or "fail"; "" where that cannot be told.
+    report : Path, optional
+        The report, in Markdown; None if no case was solved.
+    """
+
+    directory: Path
+    code: int
+    sentences: tuple[str, ...]
+    kind: str
+    report: Path | None
+
+    @property
+    def rows(self) -> list[Row]:
+        """One row per case: status, seconds, residuals, gaps in mm, the proven bound_mm, verdict."""
+        return list(series_file.rows(self.directory))
+
+
+def series(
+    scene: str | Path,
+    out: str | Path,
+    cases: GapCases = DEFAULT,
+    options: SeriesOptions = STANDARD,
+    *,
+    sweep: Sequence[str] = (),
+    allow_gap_mm: float | None = None,
+    scheduler: str | None = None,
+    reporter: Reporter = SILENT,
+) -> SeriesOutcome:
+    """Solve many load cases on one assembly, and keep them in a directory.
+
+    Parameters
+    ----------
+    scene : str or Path
+        Name of a scene, or the path of its file.
+    out : str or Path
+        The directory; the same call continues what was interrupted, more cases extend it.
+    cases : GapCases, optional
+        Random or measured gaps; by default 100 random ones.
+    options : SeriesOptions, optional
+        Solver, accuracy and limits.
+    sweep : sequence of str, optional
+        KEY=VALUES, a key of the scene and its values, in place of `cases`; all combinations of several.
+    allow_gap_mm : float, optional
+        The largest gap allowed, mm: the outcome says whether a gap is larger.
+    scheduler : str, optional
+        Dask workers: local:N, or the address of a scheduler; by default this process.
+    reporter : Reporter, optional
+        Is told what to know beforehand; silent by default.
+
+    Returns
+    -------
+    SeriesOutcome
+        Where the rows are, and what they say.
+
+    Raises
+    ------
+    InputError
+        If an input is wrong, or `out` holds another series.
+
+    Examples
+    --------
+    >>> from rivetbench import GapCases, series
+    >>> done = series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
+    >>> [row["verdict"] for row in done.rows]
+    ['within', 'within']
+    """
+    source, directory, solver = str(scene), Path(out), options.solver
+    refuse_unusable(allow_gap_mm)
+    faults = cases.faults(sweep)
+    if sweep and cases.count is not None:
+        faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
+    (made,) = described([(solver, {})], options.plugin, "--solver", reporter)
+    if options.form and options.form not in made.forms:
+        faults.append(Fault("--form", "form", options.form, f"{solver} takes {' and '.join(made.forms)}"))
+    if not (0 < options.tolerance < inf and 0 < options.limit_mm < inf):
+        accuracy = options.tolerance, options.limit_mm
+        faults.append(Fault("series", "tolerance, limit", accuracy, "must be positive and finite"))
+    if faults:
+        raise InputError(faults)
+    inputs = [Path(file) for file in (source, cases.around, cases.gaps, options.plugin) if file]
+    refuse_unwritable(directory, inputs)
+    refuse_inputs([directory / SERIES], inputs)
+    read = read_scene(source)
+    earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
+    wanted = options.form or (earlier if earlier in made.forms else None)
+    count = swept(read, sweep).count if sweep else cases.count or RANDOM
+    choice = chosen_form(read, made.forms, wanted, count)
+    if choice.why:
+        reporter.say(f"In the sparse form, without condensation: {choice.why}")
+    chosen: LoadCases = swept(read, sweep, choice.form) if sweep else cases.of(read, choice.form)
+    for sentence in (*(read.unusual if isinstance(read, JointScene) else ()), *chosen.notes):
+        reporter.say(sentence)
+    threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
+    job = Job(
+        scene=read,
+        cases=chosen,
+        solver=solver,
+        form=choice.form,
+        tolerance=options.tolerance,
+        limit_mm=options.limit_mm,
+        check=options.check,
+        threads=threads,
+        plugin=options.plugin,
+        time_limit_s=options.time_limit_s,
+        memory_limit_mib=options.memory_limit_mib,
+    )
+    facts = {"solver_version": made.version, "solver_code": made.code}
+    code = run(job, facts, directory, console_of(reporter), scheduler)
+    verdict: dict[str, Any] = {"kind": "", "said": []}
+    if allow_gap_mm is not None and code in (DONE, NOTHING_JUDGED):
+        verdict = check_series(directory, allow_gap_mm)
+    report = None
+    if series_file.read_facts(directory):
+        from report.writers.series_report import write  # slow to import: not before the first row
+
+        report = write(directory)
+    return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], report)

@@ -1,0 +1,152 @@
+"""Measures a suite into a directory, and reports on a directory again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.measurement.scheduler import threads_per_worker
+from harness.measurement.suite_run import run as run_suite
+from harness.planning.overrides import Overrides, overridden
+from harness.planning.suite import read_suite, read_written
+from harness.results import records
+from harness.results.atomic_output import refuse_inputs, refuse_unwritable
+from harness.results.records import MEASUREMENTS, Row
+from harness.results.row_validation import refuse_unreadable
+from harness.results.schema import SERIES
+from harness.results.series_file import refuse_damaged
+from harness.terminal.console import console_of
+from problems.errors import InputError
+from problems.reporter import SILENT, Reporter
+
+AS_IT_IS = Overrides()
+SUITE = "suite.toml"
+
+
+@dataclass(frozen=True)
+class SuiteOutcome:
+    """A measured suite in its directory.
+
+    Parameters
+    ----------
+    directory : Path
+        Where its rows, answers and report are.
+    code : int
+        Exit code of the command: 0 measured, 1 workers were lost, 3 nothing could be judged.
+    report : Path, optional
+        The report, in Markdown; None if nothing was measured.
+    """
+
+    directory: Path
+    code: int
+    report: Path | None
+
+    @property
+    def rows(self) -> list[Row]:
+        """One row per measurement, with the columns of docs/columns.md."""
+        return records.read(self.directory / MEASUREMENTS)
+
+
+def run(
+    suite: str | Path = "default",
+    out: str | Path | None = None,
+    change: Overrides = AS_IT_IS,
+    *,
+    scheduler: str | None = None,
+    key: str | None = None,
+    reporter: Reporter = SILENT,
+) -> SuiteOutcome:
+    """Measure a suite: a process per measurement, its answer judged, a row for each, and the report.
+
+    Parameters
+    ----------
+    suite : str or Path, optional
+        Name of a suite, path of its TOML file, or a directory that `run` wrote.
+    out : str or Path, optional
+        Output directory, by default results/SUITE; the same call continues what was interrupted.
+    change : Overrides, optional
+        What to change in the suite.
+    scheduler : str, optional
+        Dask workers: local:N, or the address of a scheduler; by default this machine.
+    key : str, optional
+        Only the row with this key, measured again.
+    reporter : Reporter, optional
+        With the console of a ConsoleReporter, rows are shown as they come; silent by default.
+
+    Returns
+    -------
+    SuiteOutcome
+        Where the rows are, and the report.
+
+    Raises
+    ------
+    InputError
+        If the suite is wrong, or `out` holds something else.
+
+    Examples
+    --------
+    >>> from rivetbench import Overrides, run
+    >>> change = Overrides(scenes=("gallery/three-part-stack",), solvers=("gi",), forms=("dual",))
+    >>> outcome = run("gate", "results/gi", change)
+    >>> {row["verdict"] for row in outcome.rows}
+    {'within'}
+    """
+    written = Path(suite) / SUITE
+    read = read_written(written) if written.is_file() else read_suite(str(suite))
+    chosen = overridden(read, change)
+    if not change.threads and "threads" not in read.model_fields_set:
+        threads = [threads_per_worker(scheduler) or chosen.threads[0]]
+        chosen = chosen.model_copy(update={"threads": threads})
+    directory = Path(out) if out else Path("results") / chosen.name
+    if not (directory / MEASUREMENTS).exists():
+        refuse_inputs([directory / SUITE], [Path(suite)])
+    code = run_suite(chosen, directory, console_of(reporter), scheduler, key)
+    if not (directory / MEASUREMENTS).is_file():
+        return SuiteOutcome(directory, code, None)
+    from report.writers.suite_report import write  # slow to import: not before the first row
+
+    return SuiteOutcome(directory, code, write(directory))
+
+
+def report(directory: str | Path) -> Path:
+    """Write the report of a run or of a series again, from its rows.
+
+    Parameters
+    ----------
+    directory : str or Path
+        A directory that `run` or `series` wrote.
+
+    Returns
+    -------
+    Path
+        The report, in Markdown; a page for a browser is beside it.
+
+    Raises
+    ------
+    InputError
+        If the directory has no rows, or damaged ones.
+
+    Examples
+    --------
+    >>> from rivetbench import report, series
+    >>> done = series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
+    >>> report("results/stack").name
+    'report.md'
+    """
+    directory = Path(directory)
+    if directory.is_dir():
+        refuse_unwritable(directory / "report", (), "DIR")
+    if (directory / SERIES).exists():
+        from report.writers.series_report import write as write_series
+
+        refuse_damaged(directory)
+        return write_series(directory)
+    path = directory / MEASUREMENTS
+    if not path.is_file():
+        raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
+    refuse_unreadable(directory)
+    if (directory / SUITE).is_file():
+        read_written(directory / SUITE)
+    from report.writers.suite_report import write
+
+    return write(directory)
