@@ -38,7 +38,7 @@ from harness.verification.reference_problem import opened
 from problems.errors import InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Vector
-from problems.forms.prepared import dual_alone, load_of
+from problems.forms.prepared import dual_alone
 from problems.forms.problem import in_form
 from problems.input.matrix_entries import SYMMETRY, contradictions
 from problems.input.user_matrices import SMALL, checked
@@ -139,7 +139,7 @@ def solve_dual(
         raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
     name, chosen = solver_named(solver, options)
     form = form_of(name, chosen.forms, "dual")
-    return forces_of(name, chosen, in_form(dual_alone(Q), form), load_of(p), tolerance)
+    return forces_of(name, chosen, in_form(dual_alone(Q), form), LoadCase(0 * p, -p), tolerance)
 
 
 @in_turn

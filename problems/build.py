@@ -39,19 +39,17 @@ def model_of(scene: Scene) -> Model:
         assert isinstance(scene, MatricesScene | ManufacturedScene)
         return GivenModel(scene)
     if scene.model is None:
-        object.__setattr__(scene, "model", _of_joint(scene))
+        if isinstance(scene.joint, Joint):
+            from problems.model.joint_model import JointModel
+
+            made: Model = JointModel.of(scene)
+        else:
+            from problems.model.superelement_model import SuperelementModel
+
+            made = SuperelementModel.of(scene)
+        object.__setattr__(scene, "model", made)
     model: Model = scene.model
     return model
-
-
-def _of_joint(scene: JointScene) -> JointModel | SuperelementModel:
-    if isinstance(scene.joint, Joint):
-        from problems.model.joint_model import JointModel
-
-        return JointModel.of(scene)
-    from problems.model.superelement_model import SuperelementModel
-
-    return SuperelementModel.of(scene)
 
 
 def prepared(scene: Scene, reporter: Reporter = SILENT, form: Form = "dual") -> Prepared:
@@ -65,24 +63,24 @@ def prepared(scene: Scene, reporter: Reporter = SILENT, form: Form = "dual") -> 
 
 
 def load_case(scene: Scene, form: Form = "dual", effects: Iterable[Effect] | None = None) -> LoadCase:
-    """f, an entry per unknown of K, and g: the sum of the scene's effects' terms, or the user's own.
+    """f, an entry per unknown of K, and g: the sum of the terms of a joint's effects, or the user's own.
 
-    effects : of a joint, those that count; by default all.
+    effects : those of the joint that count; by default all.
     """
     return model_of(scene).load_case(form == "sparse", effects)
 
 
 @dataclass(frozen=True)
 class GivenModel:
-    """As JointModel, of the scene's own K, A, f and g: there is nothing to condense."""
+    """The model of a scene that has its own K, A, f and g, so that there is nothing to condense."""
 
     scene: MatricesScene | ManufacturedScene
 
     def sparse(self) -> SparsePrepared:
-        """Raises InputError also if K is dense."""
+        """K with sparse blocks. Raises InputError also if K is dense."""
         start, scene = time.perf_counter(), self.scene
-        given, *_ = self._checked(sparse=True)
-        K = given.K.as_sparse(given.nodes)
+        assembly, *_ = self._checked(sparse=True)
+        K = assembly.K.as_sparse(assembly.nodes)
         for block in K.blocks:
             share = block.matrix.nnz / block.size**2
             if block.size > SMALL and share > DENSEST:
@@ -90,34 +88,37 @@ class GivenModel:
                 raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
         seconds = time.perf_counter() - start
         key = digest("sparse", scene.assembly_key, fingerprint([Path(__file__)], ("problems/input",)))
-        own = isinstance(scene, MatricesScene)
-        return SparsePrepared(replace(given, K=K), key, seconds, scene.source_of, own)
+        user_K = isinstance(scene, MatricesScene)
+        return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, user_K)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
-        given, _, seconds, key = self._checked(sparse=False)
-        K = given.K.as_dense()
-        if K is not given.K:
-            given = replace(given, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))
-        return DensePrepared(given, key, {"condensation": seconds}, self.scene.source_of, reporter)
+        """K with dense blocks."""
+        assembly, _, seconds, key = self._checked(sparse=False)
+        K = assembly.K.as_dense()
+        if K is not assembly.K:
+            assembly = replace(assembly, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))
+        return DensePrepared(assembly, key, {"condensation": seconds}, self.scene.source_of, reporter)
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
-        return self._given(sparse)[1]
+        """The scene's f and g; it has no effects."""
+        return self._read(sparse)[1]
 
     @property
     def built(self) -> bool:
+        """Whether the dense factors and Q are in the cache."""
         return self.dense().built
 
     def _checked(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
-        """Raises InputError if contacts of a rung depend on one another; a user's are checked when read."""
-        given = self._given(sparse)
+        """As `_read`. Raises InputError if contacts of a rung are dependent; a user's A was checked."""
+        data = self._read(sparse)
         if isinstance(self.scene, ManufacturedScene):
             from problems.input.user_matrices import refuse_dependent
 
-            refuse_dependent(given[0].A, self.scene.source_of("A"))
-        return given
+            refuse_dependent(data[0].A, self.scene.source_of("A"))
+        return data
 
-    def _given(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
-        """The matrices and loads, the seconds that reading them took, and their key."""
+    def _read(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
+        """The assembly and its load case, the seconds that reading them took, and their key."""
         scene = self.scene
         if isinstance(scene, ManufacturedScene):
             return scene.made.assembly, scene.made.load, 0.0, scene.assembly_key

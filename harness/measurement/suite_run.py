@@ -161,7 +161,7 @@ def pending_tasks(
         display.progress(f"{m.scene}: {m.solver} {m.form}")
         limit_s, stop = time_limit(m, rows)
         batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
-        exceeded = exceeded_on(batch[0], problem.prepared.assembly.asked, rows)
+        exceeded = exceeded_on(batch[0], problem.prepared.assembly.junction_size, rows)
         task = Task(batch, solvers[m.solver, m.variant], exceeded)
         yield (task, problem), task
 

@@ -118,7 +118,7 @@ def _row(
         "owner": solver.owner,
         "form": m.form,
         "variant": m.variant,
-        "n": problem.prepared.assembly.asked,
+        "n": problem.prepared.assembly.junction_size,
         "m": problem.prepared.assembly.m,
         "active": int(problem.reference.active.sum()),
         "tolerance": m.tolerance,

@@ -122,8 +122,8 @@ class Run(Reporter):
             problem = in_form(prepared(scene, form=m.form), m.form)
             start = time.perf_counter()
             cases = list(load_cases(scene, self.measurements))
-            if problem.model_s is not None:
-                self.report({"model_s": problem.model_s + time.perf_counter() - start})
+            if problem.prepared.model_s is not None:
+                self.report({"model_s": problem.prepared.model_s + time.perf_counter() - start})
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
         session = SolverSession(solver, problem, m.tolerance, self)

@@ -36,7 +36,7 @@ def arrays_of(solution: Solution) -> dict[str, Any]:
     displacements alone, and `unknowns` is all of x.
     """
     assembly, scene = solution.problem.prepared.assembly, solution.problem.scene
-    x, A, nodes, more = solution.x, assembly.asked_contacts, assembly.asked_nodes, {}
+    x, A, nodes, more = solution.x, *map(assembly.at_junction, (assembly.A, assembly.nodes)), {}
     if isinstance(scene, JointScene) and (D := scene.joint.shown) is not None:
         more, x, A = {"unknowns": x}, D @ x, sp.csc_array(D @ A)
         nodes = np.concatenate([scene.joint.nodes_of(name) for name in scene.joint.names])
@@ -60,7 +60,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "title": scene.title,
         "scene_key": scene.key,
         "form": problem.form,
-        "n": data.assembly.asked,
+        "n": data.assembly.junction_size,
         "unknowns": data.assembly.n,
         "m": data.assembly.m,
         "cond_K": data.facts.get("cond_K"),

@@ -96,7 +96,7 @@ def _table(problem: ReferenceProblem, found: Judgement, x: Vector) -> Table:
 
 def _place(problem: ReferenceProblem, x: Vector) -> str:
     assembly = problem.prepared.assembly
-    nodes = assembly.asked_nodes
+    nodes = assembly.at_junction(assembly.nodes)
     worst = int(np.argmax(assembly.at_junction(abs(x - problem.reference.x))))
     return f"at entry {worst}" if nodes is None else f"at {position(nodes[worst], nodes)}"
 

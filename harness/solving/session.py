@@ -164,7 +164,7 @@ class SolverSession:
 
 def _in_own_units(answer: Answer, units: Units) -> Answer:
     """λ and x in the problem's units; anything but an answer stays, to be refused."""
-    if units.own or not isinstance(answer, Answer):
+    if units.unchanged or not isinstance(answer, Answer):
         return answer
     lam, x = units.answer(answer.lam, answer.x)
     return replace(answer, lam=lam, x=x)

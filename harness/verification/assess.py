@@ -98,7 +98,7 @@ class GapError:
     @classmethod
     def of(cls, assembly: Assembly) -> GapError:
         k = np.diff(assembly.A.indptr)
-        norms = np.asarray(abs(assembly.asked_contacts).sum(axis=0)).ravel()
+        norms = np.asarray(abs(assembly.at_junction(assembly.A)).sum(axis=0)).ravel()
         return cls(norms, abs(assembly.A).T, gamma(k + 2), (k + 2) * ETA)
 
     def __call__(self, g: Vector, x: Vector, error_mm: float) -> Vector:

@@ -166,7 +166,7 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
         "scene": scene.name,
         "title": scene.title,
         "scene_key": scene.key,
-        "n": assembly.asked,
+        "n": assembly.junction_size,
         "m": assembly.m,
         "active": int(reference.active.sum()),
         **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},

@@ -1,8 +1,8 @@
-"""The data of a riveting problem: what load cases share, and each load case's own. Units: mm and N."""
+"""The data of a riveting problem: an assembly, and load cases on it. Units: mm and N."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,15 +18,21 @@ class Assembly:
 
     Parameters
     ----------
-    K : (n, n), N/mm, symmetric positive definite.
-    A : (n, m) sparse. Column j is the normal of contact j: +1 and −1 for two parts,
-        a single 1 for a part against a rigid tool.
-    nodes : (n, 2) coordinates of the unknowns in mm, or None if they are unknown.
-    parts : a name for each block of K.
-    notes : sentences on what reading has rounded or symmetrised of a user's numbers.
-    junction : the unknowns that are asked for, displacements in mm; None if all are. The others, of a model
-        without condensation, are inner displacements, slopes and twists.
-    places : (m, 2) coordinates of the contacts in mm, where they are not those of their first unknowns.
+    K : Stiffness (n, n), N/mm
+        Symmetric positive definite, a diagonal block for each part.
+    A : csc_array (n, m)
+        Contact normals: column j has +1 and −1 for two parts, a single 1 for a part against a rigid tool.
+    nodes : array (n, 2), mm, optional
+        Coordinates of the unknowns.
+    parts : tuple of str
+        A name for each block of K.
+    notes : tuple of str
+        Sentences on what reading has rounded or symmetrised of a user's numbers.
+    junction : array of int, optional
+        The unknowns that are displacements of the junction, in mm; by default all are. A model without
+        condensation also has inner displacements, slopes and twists.
+    places : array (m, 2), mm, optional
+        Coordinates of the contacts; by default those of their first unknowns.
     """
 
     K: Stiffness
@@ -39,34 +45,26 @@ class Assembly:
 
     @property
     def n(self) -> int:
+        """The number of unknowns."""
         return int(self.A.shape[0])
 
     @property
     def m(self) -> int:
+        """The number of contacts."""
         return int(self.A.shape[1])
 
     @property
-    def asked(self) -> int:
-        """The number of displacements that are asked for."""
+    def junction_size(self) -> int:
+        """The number of displacements of the junction."""
         return self.n if self.junction is None else len(self.junction)
 
-    def at_junction(self, x: Matrix) -> Matrix:
-        """Of (n,) or (n, k), the rows that are asked for."""
-        return x if self.junction is None else x[self.junction]
-
-    @property
-    def asked_contacts(self) -> sp.csc_array:
-        """A at the displacements that are asked for, (asked, m)."""
-        return self.A if self.junction is None else sp.csc_array(self.A[self.junction])
-
-    @property
-    def asked_nodes(self) -> Matrix | None:
-        """The coordinates of the displacements that are asked for, (asked, 2) mm."""
-        return None if self.nodes is None else self.at_junction(self.nodes)
+    def at_junction(self, rows: Any) -> Any:
+        """The rows that belong to the junction, of an array (n,) or (n, k), dense or sparse; None of None."""
+        return rows if rows is None or self.junction is None else rows[self.junction]
 
     @property
     def contact_nodes(self) -> Matrix | None:
-        """(m, 2) coordinates of the contacts in mm: those of the first unknown of each."""
+        """(m, 2) coordinates of the contacts, mm, if they are known."""
         if self.places is not None or self.nodes is None:
             return self.places
         return self.nodes[self.A.indices[self.A.indptr[:-1]]]
@@ -116,7 +114,7 @@ class DualLoadCase(LoadCase):
 
 
 def stacked(cases: Sequence[LoadCase]) -> LoadCase:
-    """Load cases as columns: f (n, k), or (n, 1) if all share it, and g (m, k)."""
+    """Load cases as the columns of one: f (n, k), or (n, 1) if all share it, and g (m, k)."""
     first = cases[0].f
     shared = all(case.f is first or np.array_equal(case.f, first) for case in cases)
     f = first[:, None] if shared else np.column_stack([case.f for case in cases])

@@ -27,8 +27,9 @@ COLUMNS_AT_A_TIME = 256  # their indices stay in the processor's cache
 
 @dataclass(frozen=True)
 class BandedInverse:
-    """order : (m,) the contacts along the joint; all vectors are in this order.
+    """M as a symmetric band.
 
+    order : (m,) the contacts along the joint; all vectors are in this order.
     band : (b + 2, m) column-major, M[j + d, j] in row d, the last row zero.
     """
 
@@ -78,7 +79,7 @@ class BandedInverse:
 
 @dataclass(frozen=True)
 class BandFactor:
-    """M_SS = LLᵀ, rows : the indices in S."""
+    """The Cholesky factor L of M_SS, S a set of contacts and rows its indices."""
 
     S: Mask
     rows: Indices
@@ -86,7 +87,9 @@ class BandFactor:
 
     @classmethod
     def of(cls, S: Mask, rows: Indices, band: Matrix) -> BandFactor:
-        """band : of M_SS, column-major; overwritten. Raises LinAlgError if it is not positive definite."""
+        """The factor of a band of M_SS, column-major, which is overwritten. Raises LinAlgError if it is not
+        positive definite.
+        """
         L, info = band_cholesky(band) if rows.size else (band, 0)
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} of M_SS is not positive definite")
@@ -94,7 +97,7 @@ class BandFactor:
 
     @classmethod
     def stiffened(cls, band: Matrix, d: Vector | float) -> BandFactor:
-        """Of M + diag(d) on all contacts. band : of M, as in `of`."""
+        """The factor of M + diag(d) on all contacts. band : of M, as in `of`."""
         band[0] += d
         every = np.ones(band.shape[1], dtype=bool)
         return cls.of(every, np.arange(len(every)), band)
@@ -107,18 +110,16 @@ class BandFactor:
         return u
 
 
-def banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse:
-    """Q (m, m). nodes : (m, 2) of the contacts, mm, or None if they are unknown.
-
-    Raises LinAlgError if Q is not positive definite.
-    """
+def banded_inverse(Q: Matrix, windows: Windows) -> BandedInverse:
+    """M ≈ Q⁻¹ from windows of Q (m, m). Raises LinAlgError if Q is not positive definite."""
     rows = np.asarray(Q).T  # no memory map, whose views cost more than their copies
-    return of_windows(Windows.of(nodes, len(Q)), lambda window: rows[np.ix_(window, window)].T)
+    return of_windows(windows, lambda window: rows[np.ix_(window, window)].T)
 
 
 def of_windows(windows: Windows, Q_WW: Callable[[Indices], Matrix]) -> BandedInverse:
-    """Q_WW : a window's principal submatrix of Q as a new array, stored by columns; it is overwritten.
+    """M ≈ Q⁻¹ from the principal submatrices of Q that `Q_WW` gives.
 
+    Q_WW : a window of contacts → its submatrix as a new array, stored by columns; it is overwritten.
     Raises LinAlgError if one is not positive definite.
     """
     m, across = len(windows.order), windows.across
@@ -128,8 +129,8 @@ def of_windows(windows: Windows, Q_WW: Callable[[Indices], Matrix]) -> BandedInv
         L, info = lapack.dpotrf(Q_WW(windows.order[first:stop]), lower=1, clean=0, overwrite_a=1)
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} of Q_WW is not positive definite")
-        own = np.eye(stop - first, stop - start, first - start, order="F")
-        rows = lapack.dtrtrs(L, own, lower=1, trans=1, overwrite_b=1)[0]
+        unit = np.eye(stop - first, stop - start, first - start, order="F")
+        rows = lapack.dtrtrs(L, unit, lower=1, trans=1, overwrite_b=1)[0]
         # Entry (i, j) of the window is band[i − j, first + j]: a view with a slanted stride, right for i ≥ j.
         window = np.lib.stride_tricks.as_strided(
             band[:, first:], shape=(stop - first, stop - first), strides=(down, right - down)
@@ -140,14 +141,14 @@ def of_windows(windows: Windows, Q_WW: Callable[[Indices], Matrix]) -> BandedInv
 
 @dataclass(frozen=True)
 class Windows:
-    """order : (m,) the contacts along the joint. across : contacts per line across it."""
+    """Contacts in lines across the joint. order : (m,) along the joint. across : contacts per line."""
 
     order: Indices
     across: int
 
     @classmethod
     def of(cls, nodes: Matrix | None, m: int) -> Windows:
-        """Of m contacts in order along the longer side of the joint."""
+        """Lines of m contacts along the longer side of the joint. nodes : (m, 2), mm, if they are known."""
         if nodes is None:
             return cls(np.arange(m), min(DEFAULT_LINE, m))
         extent = np.ptp(nodes, axis=0)

@@ -1,5 +1,5 @@
-"""Q = AᵀK⁻¹A, (m, m) mm/N, as a matrix, or by solutions with K: products and principal submatrices; and M ≈
-Q⁻¹ with a narrow band, for dense and sparse K alike: from Q itself, or from local blocks of it.
+"""The compliance Q = AᵀK⁻¹A, (m, m) mm/N, as a matrix or as products by solutions with K; and M ≈ Q⁻¹ with a
+narrow band, from Q itself or from local blocks of it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from problems.stiffness.dense_block import product
 from problems.stiffness.operator import Stiffness
 
 from .assembly import Assembly, Indices, Matrix, Vector
-from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, of_windows
+from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, banded_inverse, of_windows
 
 #: A window of contacts → its principal submatrix of Q, stored by columns, which may be overwritten.
 Local = Callable[[Indices], Matrix]
@@ -23,7 +23,7 @@ Local = Callable[[Indices], Matrix]
 
 @dataclass(frozen=True)
 class ComplianceProducts:
-    """By solutions with K."""
+    """Q for a sparse K: products by solutions with K."""
 
     K: Stiffness
     A: sp.csc_array
@@ -32,10 +32,6 @@ class ComplianceProducts:
         """Q λ, λ (m,) or (m, k)."""
         product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
         return product
-
-    def submatrix(self, rows: Indices) -> ComplianceProducts:
-        """The principal submatrix of some contacts."""
-        return ComplianceProducts(self.K, self.A[:, rows])
 
     def toarray(self) -> Matrix:
         """The matrix, by columns."""
@@ -50,22 +46,12 @@ class ComplianceProducts:
 
 @dataclass(frozen=True)
 class DenseCompliance:
-    """Q : by columns, perhaps memory-mapped."""
+    """Q as a matrix, by columns, perhaps memory-mapped."""
 
     Q: Matrix
 
     def __matmul__(self, lam: Matrix) -> Matrix:
         return product(self.Q, lam)
-
-    def submatrix(self, rows: Indices) -> DenseCompliance:
-        return DenseCompliance(self.Q[np.ix_(rows, rows)].T)
-
-    def toarray(self) -> Matrix:
-        return self.Q
-
-    def local(self, windows: Sequence[Indices], single: bool) -> Local:
-        rows = np.asarray(self.Q).T  # no memory map, whose views cost more than their copies
-        return lambda window: rows[np.ix_(window, window)].T
 
 
 Compliance = ComplianceProducts | DenseCompliance
@@ -81,52 +67,52 @@ SINGLE_BITS = 18  # of cond(Q_WW): more are lost in float32
 
 @dataclass(frozen=True)
 class ApproximateInverse:
-    """M ≈ Q⁻¹, None where it would cost too much. diagonal : of Q, about, (m,) mm/N."""
+    """M ≈ Q⁻¹, or None where it would cost too much; diagonal : estimates of q_jj, (m,) mm/N."""
 
     M: BandedInverse | None
     diagonal: Vector
 
     def scaled(self, R: Vector) -> ApproximateInverse:
-        """That of RQR, R (m,)."""
+        """The approximate inverse of RQR, R (m,)."""
         M = None if self.M is None else self.M.scaled(1 / R[self.M.order])
         return ApproximateInverse(M, self.diagonal * R**2)
 
 
-def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse:
-    """From Q itself: with a narrow band if e ← e − MQe converges fast, else from one window of all: Q⁻¹.
+def of_dense(Q: DenseCompliance, nodes: Matrix | None) -> ApproximateInverse:
+    """M from Q itself: with a narrow band if e ← e − MQe converges fast, else from one window of all: Q⁻¹.
 
-    nodes : (m, 2) of the contacts, mm, or None. Raises LinAlgError if Q is not positive definite.
+    nodes : (m, 2) coordinates of the contacts, mm. Raises LinAlgError if Q is not positive definite.
     """
     diagonal, m = np.diag(Q.Q).copy(), len(Q.Q)
     windows = Windows.of(nodes, m)
     if (WINDOW_LINES + 1) * windows.across <= WIDEST_WINDOW * m:
-        M = of_windows(windows, Q.local(windows.contacts(), False))
+        M = banded_inverse(Q.Q, windows)
         if _contracts(M, Q):
             return ApproximateInverse(M, diagonal)
-    return ApproximateInverse(
-        of_windows(Windows(np.arange(m), m), lambda _: np.array(Q.Q, order="F")), diagonal
-    )
+    whole = of_windows(Windows(np.arange(m), m), lambda _: np.array(Q.Q, order="F"))
+    return ApproximateInverse(whole, diagonal)
 
 
-def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> ApproximateInverse:
-    """From local blocks of `like`, a Q of the same contacts: in single precision, in double where some block
-    is not positive definite in that. Of few contacts without coordinates M = Q⁻¹.
+def of_products(assembly: Assembly, Q: ComplianceProducts, like: ComplianceProducts) -> ApproximateInverse:
+    """M from local blocks of `like`, a Q of the same contacts: in single precision, or in double where some
+    block is not positive definite in that. For few contacts without coordinates M is Q⁻¹.
 
-    No M where K has no band, where M is no good, and of many contacts all over an area, where M takes longer
-    than some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is indefinite.
+    There is no M where K has no band, where e ← e − MQe converges slowly, and for many contacts all over an
+    area, where M takes longer than some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises
+    LinAlgError if Q is indefinite.
     """
     m, windows = assembly.m, _along_bands(assembly)
     few = m <= FEW
     if few and assembly.contact_nodes is None:
         return of_dense(DenseCompliance(Q.toarray()), None)
-    found = None
+    inverse = None
     if few or windows.work <= SETS * assembly.K.factorisation_flops:
         if _single_might_do(assembly):
             with suppress(np.linalg.LinAlgError):
-                found = _from_windows(like, windows, single=True)
-        found = found or _from_windows(like, windows, single=False)
-    if found and found.M and _contracts(found.M, Q):
-        return found
+                inverse = _from_windows(like, windows, single=True)
+        inverse = inverse or _from_windows(like, windows, single=False)
+    if inverse and inverse.M and _contracts(inverse.M, Q):
+        return inverse
     return ApproximateInverse(None, assembly.A.power(2).T @ (1 / assembly.K.diagonal))
 
 
@@ -139,7 +125,7 @@ def _contracts(M: BandedInverse, Q: Compliance) -> bool:
     return sizes[-1] <= CONTRACTION * sizes[-2]
 
 
-def _from_windows(Q: Compliance, windows: Windows, single: bool) -> ApproximateInverse | None:
+def _from_windows(Q: ComplianceProducts, windows: Windows, single: bool) -> ApproximateInverse | None:
     local = Q.local(windows.contacts(), single)
     if local is None:
         return None
@@ -151,7 +137,7 @@ def _from_windows(Q: Compliance, windows: Windows, single: bool) -> ApproximateI
 
 
 def _single_might_do(assembly: Assembly) -> bool:
-    """Whether float32 can tell λmin(Q_WW), no less than about 1/K_ii, from zero beside q_ii."""
+    """Whether float32 can tell λmin(Q_WW) from zero beside q_ii; it is no less than about 1/K_ii."""
     A, some = assembly.A, np.linspace(0, max(assembly.m - 1, 0), SAMPLE).astype(int)
     columns = A[:, some]
     q = columns.T @ assembly.K.solve(columns.sum(axis=1))  # far from each other, so about their q_ii
@@ -160,7 +146,7 @@ def _single_might_do(assembly: Assembly) -> bool:
 
 
 def _along_bands(assembly: Assembly) -> Windows:
-    """Along the joint; without coordinates along the bands, a line of contacts per half-bandwidth."""
+    """Windows along the joint; without coordinates along the bands, a line of contacts per half-bandwidth."""
     if assembly.contact_nodes is not None:
         return Windows.of(assembly.contact_nodes, assembly.m)
     places, widest = np.arange(assembly.n), 1

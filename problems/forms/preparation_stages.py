@@ -1,5 +1,5 @@
-"""Data preparation of a scene: dense factors of K and Q from the cache, sparse factors in memory; each when
-first needed, with errors that name the scene.
+"""Data preparation of a scene, with errors that name the scene: dense factors of K, and Q, from the cache;
+sparse factors in memory. Each is made when first needed.
 """
 
 import time
@@ -25,14 +25,12 @@ SourceOf = Callable[[str], object]
 
 
 class SparsePrepared(Prepared):
-    """Factors of a sparse K, in memory.
+    """A sparse K whose factors are made in memory; that raises InputError if K is not positive definite.
 
     Parameters
     ----------
-    key : of K in the cache, where what is proven about it is kept. model_s : seconds in which K was made.
-    source_of : the origin of "K" or "A", for error messages. own : a user's K, refused if nearly singular.
-
-    Factors raise InputError if K is not positive definite.
+    key : names K in the cache, where bounds proven for it are kept. model_s : seconds in which K was made.
+    source_of : gives the origin of "K" or "A", for messages. user_K : refuse K if it is nearly singular.
     """
 
     def __init__(
@@ -41,16 +39,12 @@ class SparsePrepared(Prepared):
         key: str,
         model_s: float,
         source_of: SourceOf,
-        own: bool = False,
+        user_K: bool = False,
         coarser: Callable[[], Assembly] | None = None,
     ) -> None:
         K = Stiffness(assembly.K.blocks, self._factor)
         super().__init__(replace(assembly, K=K), coarser=coarser)
-        self.key, self.model_s, self.source_of, self.own = key, model_s, source_of, own
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        return {"model": self.model_s}
+        self.key, self.model_s, self.source_of, self.user_K = key, model_s, source_of, user_K
 
     def _factor(self, K: Stiffness) -> None:
         nodes = self.assembly.nodes
@@ -60,28 +54,27 @@ class SparsePrepared(Prepared):
             where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[error.unknown])
             key, moves = f"x[{error.unknown}]{where}", "moves without a force"
             raise indefinite(self.source_of("K"), key, moves) from error
-        if self.own:
+        if self.user_K:
             refuse_nearly_singular(K.blocks, self.source_of)
 
 
 class DensePrepared(Prepared):
-    """Factors of a dense K and Q, memory-mapped from the cache, or computed and stored there.
+    """A dense K whose factors and Q are memory-mapped from the cache, or computed and stored there.
+
+    Making factors raises InputError if K is not positive definite or, in balanced units, its condition number
+    exceeds 1e14.
 
     Parameters
     ----------
-    assembly : K and A. key : of K in the cache.
-    before : seconds of the steps before.
-    source_of : the origin of "K", for error messages.
-
-    Factors raise InputError if K is not positive definite or, in balanced units, its condition number exceeds
-    1e14.
+    key : names K in the cache. model_seconds : seconds of each step that made K.
+    source_of : gives the origin of "K", for messages.
     """
 
     def __init__(
         self,
         assembly: Assembly,
         key: str,
-        before: dict[str, float],
+        model_seconds: dict[str, float],
         source_of: SourceOf,
         reporter: Reporter,
     ) -> None:
@@ -91,7 +84,7 @@ class DensePrepared(Prepared):
         self.factors_key = storage.digest("factors", key, code)
         parts = (A.data, A.indices, A.indptr)
         self.key = storage.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
-        self.before, self.source_of, self.reporter = before, source_of, reporter
+        self.model_seconds, self.source_of, self.reporter = model_seconds, source_of, reporter
 
     @property
     def built(self) -> bool:
@@ -105,7 +98,7 @@ class DensePrepared(Prepared):
     @property
     def seconds(self) -> dict[str, float]:
         Q = storage.load(str(self.key))
-        return self.before | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
+        return self.model_seconds | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
 
     def make_Q(self) -> Matrix:
         return storage.load_or_make(str(self.key), self._make_schur)[0]["Q"]

@@ -1,4 +1,4 @@
-"""The data preparation of the paper: done once per assembly, used by every load case."""
+"""Data preparation, done once per assembly and used by every load case: factors of K, Q, M ≈ Q⁻¹, p."""
 
 from __future__ import annotations
 
@@ -29,17 +29,22 @@ RESIDUAL_ROUNDING = 32  # of ε: five are usual, whatever the size
 
 
 class Prepared:
-    """An assembly with what is derived from it, each when first needed; here in memory.
+    """An assembly with Q, M and p, which are made in memory when first needed; the factors belong to K.
 
     Parameters
     ----------
-    assembly : K and A.
-    Q : (m, m) mm/N, where it is at hand; else made when first needed.
-    coarser : makes an assembly of similar Q whose factors are cheaper, for M; None if there is none.
+    assembly : Assembly
+        K and A, of n unknowns and m contacts.
+    Q : array (m, m), mm/N, optional
+        AᵀK⁻¹A, where it is at hand.
+    coarser : function, optional
+        Makes an assembly of similar Q whose factors are cheaper, for M.
     """
 
     #: The key of the matrices in the cache; None if they are in memory only.
     key: str | None = None
+    #: Seconds in which this process made K; None if it opened K.
+    model_s: float | None = None
 
     def __init__(
         self,
@@ -57,8 +62,8 @@ class Prepared:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Of each step, as far as they are known."""
-        return {}
+        """Seconds of each step of the preparation, as far as they are known."""
+        return {} if self.model_s is None else {"model": self.model_s}
 
     @property
     def spectrum(self) -> dict[str, object]:
@@ -67,22 +72,23 @@ class Prepared:
 
     @property
     def facts(self) -> dict[str, object]:
-        """The size, the spectrum, seconds of each step, …"""
+        """The sizes, the spectrum and the seconds of each step, by the names of a row."""
         assembly = self.assembly
-        size: dict[str, object] = {"n": assembly.asked, "m": assembly.m, "parts": assembly.parts}
+        size: dict[str, object] = {"n": assembly.junction_size, "m": assembly.m, "parts": assembly.parts}
         if not assembly.K.dense:
             size["unknowns"] = assembly.n
         return size | self.spectrum | {"seconds": self.seconds}
 
     @property
     def condition(self) -> float:
-        """cond(K) if it is in the cache, else about that in balanced units."""
-        known = self.spectrum.get("cond_K")
-        return float(known) if isinstance(known, float) else self.assembly.K.condition(self.assembly.K.units)
+        """cond(K) from the cache, else an estimate in balanced units."""
+        cached = self.spectrum.get("cond_K")
+        K = self.assembly.K
+        return float(cached) if isinstance(cached, float) else K.condition(K.units)
 
     @property
     def stored_mib(self) -> dict[str, float]:
-        """MiB of K, of its factors and of Q; those of a dense K made or not."""
+        """MiB of K, of its factors and of Q; for a dense K also of those not yet made."""
         K = self.assembly.K
         sizes = {"K": sum(array.nbytes for array in K.arrays) / MIB}
         if K.dense or K.factored:
@@ -91,7 +97,7 @@ class Prepared:
 
     @property
     def opened(self) -> tuple[str, ...]:
-        """K, and of the dense factors and Q those that were asked for."""
+        """The matrices in memory, by name: K, and the dense factors and Q where they were needed."""
         K = self.assembly.K
         stages = {"factors": K.dense and K.factored, "Q": self.Q_if_made is not None}
         return ("K", *(stage for stage, made in stages.items() if made))
@@ -115,15 +121,15 @@ class Prepared:
 
     @cached_property
     def approximate_inverse(self) -> ApproximateInverse:
-        """M ≈ Q⁻¹, and about the diagonal of Q. Raises LinAlgError if Q is not positive definite."""
-        Q = self.compliance
-        if isinstance(Q, DenseCompliance):
-            return of_dense(Q, self.assembly.contact_nodes)
-        like = Prepared(self.coarser()).compliance if self.coarser else Q
-        return of_products(self.assembly, Q, like)
+        """M ≈ Q⁻¹, and an estimate of the diagonal of Q. Raises LinAlgError if Q is not positive definite."""
+        K, A = self.assembly.K, self.assembly.A
+        if K.dense:
+            return of_dense(DenseCompliance(self.Q), self.assembly.contact_nodes)
+        like = self.coarser() if self.coarser else self.assembly
+        return of_products(self.assembly, ComplianceProducts(K, A), ComplianceProducts(like.K, like.A))
 
     def scaled(self, D: Vector, R: Vector) -> Prepared:
-        """With DKD, by the factors of K, and DAR, for powers of two D (n,) and R (m,)."""
+        """The same problem with DKD, solved by K's factors, and DAR, for powers of two D (n,) and R (m,)."""
         return _Scaled(self, D, R)
 
     def overlap(self, load: LoadCase) -> Vector:
@@ -180,12 +186,7 @@ class _Scaled(Prepared):
 
 
 def dual_alone(Q: Matrix) -> Prepared:
-    """Q (m, m) mm/N without a joint: the dual program of K = Q⁻¹ and A = I, for p = −g (see `load_of`)."""
+    """Q (m, m) mm/N without a joint: the dual program of K = Q⁻¹ and A = I, for loads with p = −g."""
     from problems.stiffness.dense_block import InverseBlock  # of this only
 
     return Prepared(Assembly(Stiffness([InverseBlock(Q)]), sp.eye_array(len(Q), format="csc")), Q)
-
-
-def load_of(p: Vector) -> LoadCase:
-    """The load case with AᵀK⁻¹f − g = p, (m,) mm."""
-    return LoadCase(np.zeros(len(p)), -p)

@@ -21,15 +21,20 @@ AnyLoadCase = TypeVar("AnyLoadCase", bound=LoadCase)
 
 
 class Problem:
-    """An assembly in the primal form, min ½xᵀKx − fᵀx, Aᵀx ≤ g, n unknowns; a subclass has another one.
+    """An assembly in the primal form, min ½xᵀKx − fᵀx, Aᵀx ≤ g, n unknowns; a subclass has another form.
 
-    Needs K and A, no factor. The arrays may be memory-mapped and are read-only.
+    The primal form reads K and A, and no factor. The arrays may be memory-mapped and are read-only.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The assembly, with factors of K and Q, which are made when a form first needs them.
     """
 
     form: ClassVar[Form] = "primal"
     #: Whether bounds z ≥ 0 replace the rows Gz ≤ h.
     bounded: ClassVar[bool] = False
-    #: What an answer must contain; x, if not among these, is recovered from λ.
+    #: The fields that an answer must have; x, where it is none of these, is recovered from λ.
     needs: ClassVar[tuple[str, ...]] = ("lam", "x")
 
     def __init__(self, prepared: Prepared) -> None:
@@ -80,8 +85,8 @@ class Problem:
         return load.g - self.assembly.A.T @ x
 
     def distance(self, one: LoadCase, other: LoadCase) -> float:
-        """Between load cases, to choose the answer to start from; here the larger of the relative changes of
-        f and g, in their 2-norms.
+        """The distance between load cases, by which the answer to start from is chosen: the larger of the
+        relative changes of f and g, in their 2-norms.
         """
         pairs = ((one.f, other.f), (one.g, other.g))
         return max(float(np.linalg.norm(a - b) / (np.linalg.norm(b) or 1.0)) for a, b in pairs)
@@ -92,33 +97,28 @@ class Problem:
         return self.assembly.K.arrays
 
     @property
-    def model_s(self) -> float | None:
-        """Seconds in which this process made the matrices; None if it opened them."""
-        return None
-
-    @property
     def yardstick(self) -> Matrix | None:
-        """The matrix whose Cholesky factorisation times are compared with; None in a form without one."""
-        return self.Q
+        """Q, whose Cholesky factorisation is a yardstick of times; None for a sparse K."""
+        return self.Q if self.assembly.K.dense else None
 
     def recover(
         self, lams: Sequence[Vector | None], xs: Sequence[Vector | None], cases: Sequence[LoadCase]
     ) -> list[Vector | None]:
-        """x (n,) mm of each answer: the solver's own, else K⁻¹(f − Aλ), with one pass over K for all."""
-        found = list(xs)
-        known = [k for k, lam in enumerate(lams) if lam is not None]
-        if known and "x" not in self.needs:
-            lam = np.column_stack([np.asarray(lams[k], dtype=float) for k in known])
-            x = self.prepared.recover(lam, stacked([cases[k] for k in known])).T
-            for k, mine in zip(known, x, strict=True):
-                found[k] = np.ascontiguousarray(mine)
-        return found
+        """x (n,) mm of each answer: the solver's, or K⁻¹(f − Aλ) in the dual form, in one pass over K."""
+        recovered = list(xs)
+        solved = [k for k, lam in enumerate(lams) if lam is not None]
+        if solved and "x" not in self.needs:
+            lam = np.column_stack([np.asarray(lams[k], dtype=float) for k in solved])
+            x = self.prepared.recover(lam, stacked([cases[k] for k in solved])).T
+            for k, column in zip(solved, x, strict=True):
+                recovered[k] = np.ascontiguousarray(column)
+        return recovered
 
 
 class Dual(Problem):
     """min ½λᵀQλ − pᵀλ, λ ≥ 0, m unknowns, with Q = AᵀK⁻¹A and p = AᵀK⁻¹f − g.
 
-    Needs the factors of K, for p and for x = K⁻¹(f − Aλ), and Q.
+    It reads Q, and the factors of K for p and x = K⁻¹(f − Aλ).
     """
 
     form: ClassVar[Form] = "dual"
@@ -168,24 +168,16 @@ class Dual(Problem):
 class Sparse(Problem):
     """min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ g over all N unknowns of the model, K̂ and B sparse.
 
-    Nothing is condensed: x is û at the junction, and λ is that of the other forms. Needs K̂ and B, no factor.
-    prepared : any; if its blocks are dense, a sparse copy.
+    Nothing is condensed: x is û at the junction, and λ is the same as in the other forms. It reads K̂ and B,
+    and no factor. If K has dense blocks, it is copied.
     """
 
     form: ClassVar[Form] = "sparse"
 
     def __init__(self, prepared: Prepared) -> None:
-        given = prepared.assembly
-        K = given.K.as_sparse(given.nodes)
-        super().__init__(prepared if K is given.K else Prepared(replace(given, K=K)))
-
-    @property
-    def model_s(self) -> float | None:
-        return self.prepared.seconds.get("model")
-
-    @property
-    def yardstick(self) -> None:
-        return None
+        dense = prepared.assembly
+        K = dense.K.as_sparse(dense.nodes)
+        super().__init__(prepared if K is dense.K else Prepared(replace(dense, K=K)))
 
 
 def in_form(prepared: Prepared, form: Form) -> Problem:

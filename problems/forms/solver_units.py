@@ -36,7 +36,7 @@ USUAL = 2.0**8  # mm: displacements between this and its inverse need no unit of
 
 @dataclass(frozen=True)
 class Units:
-    """D (n,), R (m,), δ, and of a load case ℓ."""
+    """The units of a problem, D (n,), R (m,) and δ, and ℓ, that of the load cases solved in them."""
 
     problem: Problem
     D: Vector
@@ -58,28 +58,28 @@ class Units:
         return cls(problem, D, 1 / power_of_two(lengths), _median(D[A.indices] if A.nnz else D))
 
     def scaled(self) -> Problem:
-        """The problem in these units; itself, if they are its own."""
+        """The problem in these units; itself, if D and R are 1."""
         if (self.D == 1).all() and (self.R == 1).all():
             return self.problem
         return in_form(self.problem.prepared.scaled(self.D, self.R), self.problem.form)
 
     def of_loads(self, loads: Sequence[LoadCase]) -> Units:
-        """With the ℓ of these load cases; 1 if there are neither loads nor gaps."""
+        """The units with the ℓ of these load cases; 1 if there are neither loads nor gaps."""
         size = self._size(loads)
         return replace(self, length=1.0 if size == 0 or _usual(size) else float(power_of_two(size)))
 
     def followed_by(self, load: LoadCase) -> Units:
-        """These, in which what was solved before may be kept; others, for a load case of another size."""
+        """The same units, in which earlier answers stay valid; new ones for a load case of another size."""
         size = self._size([load])
         return self if _usual(size / self.length) else self.of_loads([load])
 
     def _size(self, loads: Sequence[LoadCase]) -> float:
-        """About the displacements, mm."""
+        """An estimate of the displacements, mm."""
         size = max((float(abs(self.delta * self.R * load.g).max(initial=0.0)) for load in loads), default=0.0)
         return size if _usual(size) else max(size, *(self._moved(load) for load in loads))
 
     def _moved(self, load: LoadCase) -> float:
-        """max |f_i|/k_ii, as of displacements at contacts, mm."""
+        """max |f_i|/k_ii in the unit of displacements at contacts, mm."""
         if not load.f.any():
             return 0.0
         return float(abs(self.delta * load.f / (self.D * self.problem.assembly.K.diagonal)).max())
@@ -89,8 +89,8 @@ class Units:
         return self.length / self.delta
 
     @property
-    def own(self) -> bool:
-        """Whether these are the problem's own units."""
+    def unchanged(self) -> bool:
+        """Whether these are the units of the problem itself."""
         return bool(self.U == 1 and (self.D == 1).all() and (self.R == 1).all())
 
     def tolerance(self, tolerance: float) -> float:
@@ -98,7 +98,8 @@ class Units:
         return tolerance / self.length
 
     def load(self, load: LoadCase) -> LoadCase:
-        if self.own:
+        """The load case in these units."""
+        if self.unchanged:
             return load
         f, g, energy = self.D * load.f / self.U, self.R * load.g / self.U, self.U**2
         if isinstance(load, DualLoadCase):
@@ -106,12 +107,12 @@ class Units:
         return read_only(LoadCase(f, g, energy=energy))
 
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector, Vector, Vector | None]:
-        """λ, gaps and x of a warm start."""
+        """λ, gaps and x of a warm start, in these units."""
         x = None if x is None else x / (self.U * self.D)
         return lam / (self.U * self.R), gap * self.R / self.U, x
 
     def answer(self, lam: Any, x: Any) -> tuple[Any, Any]:
-        """λ and x in the problem's own units; what is no vector of that length stays, to be refused."""
+        """λ and x in the problem's units; anything but a vector of their length stays, to be refused."""
         return _times(self.U * self.R, lam), _times(self.U * self.D, x)
 
 
@@ -120,11 +121,11 @@ def _usual(size: float) -> bool:
 
 
 def _median(values: Vector) -> float:
-    """One of the values."""
+    """The upper median, which is one of the values."""
     return float(np.sort(values)[len(values) // 2])
 
 
-def _times(units: Vector, given: Any) -> Any:
-    vector = np.asarray(given) if isinstance(given, list | tuple) else given
+def _times(units: Vector, answer: Any) -> Any:
+    vector = np.asarray(answer) if isinstance(answer, list | tuple) else answer
     real = isinstance(vector, np.ndarray) and vector.dtype.kind in "fiu" and vector.shape == units.shape
-    return units * vector if real else given
+    return units * vector if real else answer

@@ -83,7 +83,7 @@ class SuperelementModel:
             blocks.append(sp.csc_array(K + added[rows, rows] if self.springs else K))
         seconds = time.perf_counter() - start
         key = storage.digest("sparse", self._key, fingerprint([Path(__file__)], ("problems/model",)))
-        return SparsePrepared(self._assembly(blocks), key, seconds, self.scene.source_of, own=True)
+        return SparsePrepared(self._assembly(blocks), key, seconds, self.scene.source_of, user_K=True)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         start = time.perf_counter()

@@ -12,6 +12,7 @@ from . import Indices, Matrix, Vector
 from .selected_inverse import BlockPart
 
 ENTRIES_AT_A_TIME = 2**15  # of a sparse block: a panel stays in the processor's cache
+COLUMNS_AT_A_TIME = 64  # of K⁻¹A
 
 
 class NotPositiveDefinite(np.linalg.LinAlgError):
@@ -40,8 +41,7 @@ class Block(ABC):
 
     def diagonal(self) -> Vector:
         """(size,) N/mm."""
-        found: Vector = self.matrix.diagonal()
-        return found
+        return np.asarray(self.matrix.diagonal())
 
     @property
     def band(self) -> tuple[int, Indices | None] | None:
@@ -60,7 +60,7 @@ class Block(ABC):
     @property
     @abstractmethod
     def factor_nonzeros(self) -> int:
-        """The float64 that its factor holds; about that, before a general one is made."""
+        """The float64 that its factor holds; an estimate before a general factor is made."""
 
     @abstractmethod
     def solve(self, b: Matrix) -> Matrix:
@@ -92,7 +92,7 @@ class Block(ABC):
 
 
 class SparseBlock(Block):
-    """matrix : csc_array; copied only to be sorted and to add up what is given several times.
+    """A block stored as a csc_array; it is copied only to sort its entries and to add up repeated ones.
 
     A pivot ≤ lost · k_ii counts as zero: K is singular.
     """
@@ -114,7 +114,7 @@ class SparseBlock(Block):
         return [self.matrix.data, self.matrix.indices, self.matrix.indptr]
 
     def panels(self) -> Iterator[tuple[slice, Any]]:
-        """Of K's columns, which are its rows."""
+        """Panels of K's columns, which are its rows."""
         K, start = self.matrix, 0
         while start < self.size:
             far = int(np.searchsorted(K.indptr, K.indptr[start] + ENTRIES_AT_A_TIME, side="right")) - 1
@@ -123,6 +123,13 @@ class SparseBlock(Block):
             parts = K.data[entries], K.indices[entries], K.indptr[start : stop + 1] - K.indptr[start]
             yield slice(start, stop), sp.csr_array(parts, shape=(stop - start, self.size))
             start = stop
+
+    def compliance(self, A: sp.csc_array) -> Matrix:
+        Q = np.empty(A.shape[1:] * 2)
+        for start in range(0, A.shape[1], COLUMNS_AT_A_TIME):
+            some = slice(start, start + COLUMNS_AT_A_TIME)
+            Q[:, some] = A.T @ self.solve(A[:, some].toarray())
+        return (Q + Q.T) / 2
 
 
 def scaled(M: sp.csc_array, rows: Vector, columns: Vector) -> sp.csc_array:

@@ -26,8 +26,8 @@ class Stiffness:
     Parameters
     ----------
     blocks : its diagonal blocks.
-    factor : makes their factors, once, when K⁻¹ is first needed, in place of `factor_blocks`: it may take
-        them from a cache, or say in an error whose K it is.
+    factor : makes their factors when K⁻¹ is first needed; by default `factor_blocks`. It may take them from a
+        cache, or name the scene in its errors.
     """
 
     def __init__(self, blocks: Sequence[Block], factor: Callable[[Stiffness], object] | None = None) -> None:
@@ -40,7 +40,7 @@ class Stiffness:
 
     @classmethod
     def of(cls, *matrices: Any, nodes: Matrix | None = None) -> Stiffness:
-        """With these diagonal blocks, dense or sparse. nodes : (n, 2) of the unknowns."""
+        """K with these diagonal blocks, dense or sparse. nodes : (n, 2) coordinates of the unknowns, mm."""
         ends = np.cumsum([0, *(K.shape[0] for K in matrices)])
         return cls(
             [
@@ -57,13 +57,13 @@ class Stiffness:
         return all(block.dense for block in self.blocks)
 
     def as_sparse(self, nodes: Matrix | None = None) -> Stiffness:
-        """The same K with sparse blocks; itself, if they are."""
+        """The same K with sparse blocks; itself, if its blocks are sparse."""
         if not any(block.dense for block in self.blocks):
             return self
         return Stiffness.of(*map(sp.csc_array, self.matrices), nodes=nodes)
 
     def as_dense(self) -> Stiffness:
-        """The same K with dense blocks; itself, if they are."""
+        """The same K with dense blocks; itself, if its blocks are dense."""
         return self if self.dense else Stiffness.of(*dense_blocks(sp.csr_array(self.matrix)))
 
     @property
@@ -85,14 +85,14 @@ class Stiffness:
 
     def multiply(self, x: Matrix) -> Matrix:
         """K x, x (n,) or (n, k)."""
-        return np.concatenate([block.multiply(x[rows]) for block, rows in self._own_rows()])
+        return np.concatenate([block.multiply(x[rows]) for block, rows in self._blocks_with_rows()])
 
     def solve(self, b: Matrix) -> Matrix:
         """K⁻¹ b, b (n,) or (n, k). Raises NotPositiveDefinite, or what `factor` raises."""
         self.ensure_factored()
-        return np.concatenate([block.solve(b[rows]) for block, rows in self._own_rows()])
+        return np.concatenate([block.solve(b[rows]) for block, rows in self._blocks_with_rows()])
 
-    def _own_rows(self) -> Iterator[tuple[Block, slice]]:
+    def _blocks_with_rows(self) -> Iterator[tuple[Block, slice]]:
         return zip(self.blocks, self.slices, strict=True)
 
     def ensure_factored(self) -> None:
@@ -115,12 +115,12 @@ class Stiffness:
 
     @property
     def factorisation_flops(self) -> float:
-        """Operations of a factorisation: about the entries of each column of a factor, squared."""
+        """Operations of a factorisation, about Σ (entries of a column of the factor)²."""
         return sum(block.factor_nonzeros**2 / block.size for block in self.blocks)
 
     def factor_blocks(self) -> None:
-        """Raises NotPositiveDefinite, with the number of an unknown that moves."""
-        for block, rows in self._own_rows():
+        """Factor each block. Raises NotPositiveDefinite, with the number of an unknown that moves."""
+        for block, rows in self._blocks_with_rows():
             try:
                 block.factor()
             except NotPositiveDefinite as error:
@@ -137,13 +137,13 @@ class Stiffness:
         return balanced_units(self.diagonal)
 
     def panels(self) -> Iterator[tuple[slice, slice, Any]]:
-        """(rows, columns, K[rows, columns]) of all rows, some at a time, dense or csr; K is zero beside."""
-        for block, own in self._own_rows():
+        """(rows, columns, K[rows, columns]), all rows in turn, dense or csr; other columns are zero there."""
+        for block, all_rows in self._blocks_with_rows():
             for rows, panel in block.panels():
-                yield slice(own.start + rows.start, own.start + rows.stop), own, panel
+                yield slice(all_rows.start + rows.start, all_rows.start + rows.stop), all_rows, panel
 
     def absolute_sums(self, D: Vector) -> Vector:
-        """|K|D, (n,), but for rounding."""
+        """|K|D, (n,), up to rounding."""
         sums = np.empty(self.size)
         for rows, columns, panel in self.panels():
             sums[rows] = abs(panel) @ D[columns]
@@ -151,16 +151,16 @@ class Stiffness:
 
     @cached_property
     def norm(self) -> float:
-        """‖K‖_∞ = max_i Σ_j |K_ij|, N/mm, but for rounding."""
+        """‖K‖_∞ = max_i Σ_j |K_ij|, N/mm, up to rounding."""
         return float(self.absolute_sums(np.ones(self.size)).max(initial=0.0))
 
     def least_eigenvalues(self, D: Vector, steps: int = POWER_STEPS) -> list[float]:
-        """About λmin of each block of DKD, no smaller."""
+        """An estimate of λmin of each block of DKD, no smaller than it."""
         self.ensure_factored()
-        return [_least_eigenvalue(block.solve, D[rows], steps) for block, rows in self._own_rows()]
+        return [_least_eigenvalue(block.solve, D[rows], steps) for block, rows in self._blocks_with_rows()]
 
     def condition(self, D: Vector) -> float:
-        """About the condition number of DKD, whose largest eigenvalue is at most ‖DKD‖_∞."""
+        """An estimate of the condition number of DKD, with ‖DKD‖_∞ for its largest eigenvalue."""
         least = min(self.least_eigenvalues(D))
         return float((self.absolute_sums(D) * D).max()) / least if least > 0 else np.inf
 
@@ -169,7 +169,7 @@ class Stiffness:
         m = A.shape[1]
         Q = np.zeros((m, m), order="F")
         self.ensure_factored()
-        for block, rows in self._own_rows():
+        for block, rows in self._blocks_with_rows():
             if m:
                 Q += block.compliance(sp.csc_array(A[rows]))
         return mirrored(Q)
@@ -177,12 +177,13 @@ class Stiffness:
     def local_compliance(
         self, A: sp.csc_array, windows: Sequence[Indices], single: bool = True
     ) -> Callable[[Indices], Matrix] | None:
-        """Q_WW (k, k) mm/N, by columns, of windows W of contacts, in single precision to four digits, for a
-        preconditioner; None unless every block has a band along which those of a window are near each other.
+        """A function that gives Q_WW (k, k) mm/N, by columns, for a window W of contacts; in single precision
+        about four digits are right, enough for a preconditioner. None unless every block has a band along
+        which the contacts of each window are near each other.
         """
         self.ensure_factored()
         parts: list[BlockPart] = []
-        for block, rows in self._own_rows():
+        for block, rows in self._blocks_with_rows():
             part = block.local_compliance(sp.csc_array(A[rows]), windows, single)
             if part is None:
                 return None
@@ -209,12 +210,12 @@ class ScaledStiffness(Stiffness):
 
     @cached_property
     def matrices(self) -> tuple[Any, ...]:
-        """Made when first asked for, read-only."""
-        own = zip(self.blocks, (self.D[rows] for rows in self.slices), strict=True)
-        found = tuple(scaled(block.matrix, D, D) for block, D in own)
-        for matrix in found:
+        """DKD's blocks, read-only."""
+        pairs = zip(self.blocks, self.slices, strict=True)
+        matrices = tuple(scaled(block.matrix, self.D[rows], self.D[rows]) for block, rows in pairs)
+        for matrix in matrices:
             matrix.data.flags.writeable = False
-        return found
+        return matrices
 
     @cached_property
     def diagonal(self) -> Vector:
@@ -228,11 +229,11 @@ class ScaledStiffness(Stiffness):
         return _times(1 / self.D, self.base.solve(_times(1 / self.D, b)))
 
     def panels(self) -> Iterator[tuple[slice, slice, Any]]:
-        for rows, own, panel in self.base.panels():
-            yield rows, own, sp.diags_array(self.D[rows]) @ panel @ sp.diags_array(self.D[own])
+        for rows, columns, panel in self.base.panels():
+            yield rows, columns, sp.diags_array(self.D[rows]) @ panel @ sp.diags_array(self.D[columns])
 
     def compliance(self, A: sp.csc_array) -> Matrix:
-        """With D⁻¹A, Aᵀ(DKD)⁻¹A is that of K."""
+        """Aᵀ(DKD)⁻¹A, which is the compliance of K for D⁻¹A."""
         return self.base.compliance(scaled(A, 1 / self.D, np.ones(A.shape[1])))
 
 
@@ -241,7 +242,7 @@ def _times(D: Vector, x: Matrix) -> Matrix:
 
 
 def _least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector, steps: int) -> float:
-    """About λmin(DKD), no smaller, by the power method on its inverse. solve : b → K⁻¹b."""
+    """An estimate of λmin(DKD), no smaller, by the power method on its inverse. solve : b → K⁻¹b."""
     v = np.random.default_rng(0).standard_normal(len(D))
     largest = 0.0
     for _ in range(steps):

@@ -1,8 +1,8 @@
 """A sparse block: a band if some numbering gives a narrow one, else a factor with little fill, by CHOLMOD
 where the extra `cholmod` is installed, or by SuperLU.
 
-Tried are the numbering as it is, the one along the longer side of the model, and Cuthill and McKee's; the
-first that is narrow enough is taken.
+Three numberings are tried: the given one, the one along the longer side of the model, and Cuthill and
+McKee's. The first that gives a narrow band is taken.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,6 @@ from .superlu import SuperLU, moving_unknown
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 WITH_INDICES = 1.5  # numbers of eight bytes per entry of a sparse matrix
-AT_A_TIME = 64  # columns of K⁻¹A
 
 
 def sparse_block(K: sp.csc_array, nodes: Matrix | None = None) -> SparseBlock:
@@ -47,8 +46,9 @@ def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Indices]:
 
 
 class GeneralFactor(Protocol):
-    """A factor of K. nonzeros : the float64 that it holds, if known. LinAlgError, where it is made, says that
-    K is not positive definite.
+    """A factor of K, made by a library; making it raises LinAlgError if K is not positive definite.
+
+    nonzeros : the float64 that it holds; None if the library does not tell.
     """
 
     @property
@@ -71,7 +71,7 @@ def general_factor(K: sp.csc_array, lost: float) -> GeneralFactor:
 
 
 class GeneralBlock(SparseBlock):
-    """width : the least half-bandwidth that was found."""
+    """A block without a narrow band. width : the least half-bandwidth of the numberings tried."""
 
     make_factor = staticmethod(general_factor)
 
@@ -118,10 +118,3 @@ class GeneralBlock(SparseBlock):
         except np.linalg.LinAlgError:
             return None
         return None if error is None else error + U * (largest + abs(s))
-
-    def compliance(self, A: sp.csc_array) -> Matrix:
-        Q = np.empty(A.shape[1:] * 2)
-        for start in range(0, A.shape[1], AT_A_TIME):
-            some = slice(start, start + AT_A_TIME)
-            Q[:, some] = A.T @ self.solve(A[:, some].toarray())
-        return (Q + Q.T) / 2

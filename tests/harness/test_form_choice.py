@@ -30,7 +30,7 @@ def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_m
     assert estimate.half_bandwidth is not None
     data = prepared(scene, form="sparse")
     assert not data.assembly.K.dense
-    assert (estimate.n, estimate.m) == (data.assembly.asked, data.assembly.m)
+    assert (estimate.n, estimate.m) == (data.assembly.junction_size, data.assembly.m)
     assert estimate.unknowns == data.assembly.n
     assert estimate.half_bandwidth == max(map(half_bandwidth, data.assembly.K.matrices))
     stored = 8 * data.assembly.K.factor_nonzeros

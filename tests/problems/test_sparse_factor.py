@@ -16,7 +16,7 @@ from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Matrix
 from problems.scene_files import read_scene
-from problems.stiffness import band_factor, banded_block
+from problems.stiffness import band_factor
 from problems.stiffness.band_factor import half_bandwidth, lower_band
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.block import NotPositiveDefinite
@@ -196,16 +196,3 @@ def test_a_scene_with_a_mechanism_is_bad_input_that_says_where_it_moves(
         allowed.append(fault.allowed)
     assert set(allowed) == {allowed[0]}
     assert re.fullmatch(r"x\[6[0-3]\]" + (r" at \(6[0-3], 0\) mm" if with_nodes else ""), fault.key)
-
-
-@pytest.mark.parametrize("body", [1, 3])
-def test_the_compliance_of_many_bodies_takes_few_blocks(body: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not one for each body; with contacts between neighbours, and one from the first body to the last."""
-    n, made = 600, []
-    blocks = banded_block.band_blocks
-    monkeypatch.setattr(banded_block, "band_blocks", lambda *given: made.append(1) or blocks(*given))
-    K = sp.csc_array(sp.block_diag([np.eye(body) * body + 1.0] * (n // body)))
-    A = sp.csc_array(sp.eye_array(n) - sp.eye_array(n, k=-1) + sp.csc_array(([0.5], ([n - 1], [0])), (n, n)))
-    found = Stiffness.of(K).compliance(A)
-    close(found, A.T @ np.linalg.solve(K.toarray(), A.toarray()))
-    assert len(made) <= n / 50

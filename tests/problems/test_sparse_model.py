@@ -52,9 +52,9 @@ def check_same(scene: JointScene) -> None:
     case, load = load_case(scene), load_case(scene, "sparse")
     random, model, K = np.random.default_rng(1), whole.assembly, sp.block_diag(dense.assembly.K.matrices)
     junction = model.junction
-    assert (model.asked, model.m) == (dense.assembly.n, dense.assembly.m)
+    assert (model.junction_size, model.m) == (dense.assembly.n, dense.assembly.m)
     assert not any((block != block.T).nnz for block in model.K.matrices)  # to the last bit: proofs rely on it
-    V = np.eye(model.asked) if model.n < 3000 else random.standard_normal((model.asked, 9))
+    V = np.eye(model.junction_size) if model.n < 3000 else random.standard_normal((model.junction_size, 9))
     np.testing.assert_allclose(condensed(model, V), K @ V, rtol=0, atol=1e-9 * abs(K).max())
     np.testing.assert_array_equal(model.at_junction(model.A.toarray()), dense.assembly.A.toarray())
     assert abs(model.A).sum() == abs(dense.assembly.A).sum()

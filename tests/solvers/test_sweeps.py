@@ -80,7 +80,7 @@ def test_where_forces_act_on_neighbours_alone_m_is_the_inverse() -> None:
     K = chain(40)
     shuffled = np.random.default_rng(0).permutation(40)
     Q = np.asfortranarray(np.linalg.inv(K)[np.ix_(shuffled, shuffled)])
-    M = banded_inverse(Q, np.column_stack([7.0 * shuffled, np.zeros(40)]))
+    M = banded_inverse(Q, Windows.of(np.column_stack([7.0 * shuffled, np.zeros(40)]), 40))
     np.testing.assert_array_equal(shuffled[M.order], np.arange(40))
     np.testing.assert_allclose(full(M), K, atol=1e-12)
 
@@ -107,7 +107,7 @@ def test_lines_a_little_closer_than_wide_are_lines_still(dx: float, across: int)
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
 def test_a_band_factor_solves_with_the_principal_submatrix(share: float, tmp_path: Path) -> None:
     data = prepared(read_scene(str(write_strip(tmp_path))))
-    M = banded_inverse(data.Q, data.assembly.contact_nodes)
+    M = banded_inverse(data.Q, Windows.of(data.assembly.contact_nodes, 45))
     dense, rng = full(M), np.random.default_rng(2)
     assert len(M.band) - 2 < 44  # a band, not all of it
     S, b = rng.random(45) < share, rng.standard_normal(45)
@@ -118,7 +118,7 @@ def test_a_band_factor_solves_with_the_principal_submatrix(share: float, tmp_pat
 
 def test_one_factor_takes_the_place_of_another_but_not_of_its_copy(tmp_path: Path) -> None:
     data = prepared(read_scene(str(write_strip(tmp_path))))
-    M, rng = banded_inverse(data.Q, data.assembly.contact_nodes), np.random.default_rng(2)
+    M, rng = banded_inverse(data.Q, Windows.of(data.assembly.contact_nodes, 45)), np.random.default_rng(2)
     (S, T), b = rng.random((2, 45)) < 0.5, rng.standard_normal(45)
     wanted, factor = M.factor(S).solve(b), OpenFactor(M)
     first, copy = factor(S), factor.copy()
