@@ -43,25 +43,26 @@ ROW, AROUND = 0.19, 0.45  # inches: a bar; the title and the axis of a panel
 
 
 def how_fast(results: Results) -> Section | None:
-    """For every solver in every form: against libraries, against textbook methods, in seconds."""
+    """The seconds of ours, and libraries and textbook methods as multiples, over all solvers and forms."""
     table = ours_and_others(results)
     return None if table.empty else Section("How fast is it?", [how_fast_table(table)])
 
 
 def how_fast_table(table: pd.DataFrame) -> Table:
-    """Of lines as `ours_and_others` and `in_series` make them."""
+    """A table of lines from `ours_and_others` and `in_series`."""
     columns = [
         word("question", "question"),
         number("n", "n", whole),
         number("scenes", "scenes", whole),
-        Column("the fastest library takes", _times("library")),
-        Column("the fastest textbook method takes", _times("textbook")),
-        Column("the fastest of ours, s (worst scene)", _seconds),
+        Column("ours, s (worst scene)", _seconds),
+        Column("the fastest library (least)", _times("library")),
+        Column("the fastest textbook method (least)", _times("textbook")),
     ]
     caption = (
         "*How fast is it?* From the scene on: condensation, factors, Q and preparation included where a form "
-        "needs them. How many times as long as the fastest of ours: the median over the scenes (the least). "
-        "A scene on which none of them is within the limit counts as more than all others."
+        "needs them. Seconds of the fastest of ours, the median over the scenes; the others as multiples of "
+        "it, the median (the least). A scene on which none of them is within the limit counts as more than "
+        "all others."
     )
     return Table("how-fast", caption, table, columns, keys=2)
 
