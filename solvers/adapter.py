@@ -8,7 +8,7 @@ Kx − f + Aλ, mm for Aᵀx − g and Qλ − p; N·mm for the duality gap (`ga
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,7 +17,8 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
 
-from .base import FORMS, Answer, Form, Problem, Solver, Status, WarmStart, chosen, one_of, require
+from .base import FORMS, Answer, Form, Problem, Solver, WarmStart
+from .options import library_settings, one_of, require
 
 GAP_ROUNDING = 1e-13  # PIQP comes down to 3e-14 on some scenes, and waits for 1.5e-14 in vain on others
 
@@ -38,35 +39,27 @@ class Converted:
         """(z, multipliers) from which to solve."""
         return self.problem.start(start.lam, start.gap, start.x)
 
-    def answer(
-        self,
-        status: Status,
-        tolerance: float,
-        z: Vector,
-        multipliers: Vector | None,
-        **facts: Any,
-    ) -> Answer:
-        """The answer of a solution z and the multipliers of its rows, if there are rows."""
+    def answer(self, report: Answer, z: Vector, multipliers: Vector | None, tolerance: float) -> Answer:
+        """The library's report with λ and x from its solution z and the multipliers of its rows, if any."""
         lam, x = self.problem.answer(z, multipliers)
-        if lam is None:
-            return Answer("failed", None, **facts)
-        return answer(status, tolerance, lam, x, **facts)
+        return clipped(replace(report, lam=lam, x=x), tolerance)
 
 
 class Library(Solver):
     """Base of the adapters that hand on a library's own settings.
 
-    choices : the adapter's own options, each with its values, the default first.
+    choices : the adapter's own options, each with its values, the default first. selected : their values.
+    settings : the library's settings that the user changed.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = FORMS
+    forms: tuple[Form, ...] = FORMS
     choices: ClassVar[dict[str, tuple[Any, ...]]]
 
     def __init__(self, **options: object) -> None:
         name = type(self).__name__.lower()
-        self.own: dict[str, Any] = {key: options.pop(key, values[0]) for key, values in self.choices.items()}
-        require(name, self.own, **{key: one_of(self.own[key], self.choices[key]) for key in self.own})
-        self.settings = chosen(name, options, self.defaults())
+        self.selected: dict[str, Any] = {k: options.pop(k, values[0]) for k, values in self.choices.items()}
+        require(name, self.selected, **{k: one_of(self.selected[k], v) for k, v in self.choices.items()})
+        self.settings = library_settings(name, options, self.defaults())
 
     @abstractmethod
     def defaults(self) -> Any:
@@ -96,16 +89,17 @@ def gap_tolerance(tolerance: float, load: LoadCase) -> float:
     return min(tolerance, max(tolerance / load.energy, GAP_ROUNDING))
 
 
-def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = None, **facts: Any) -> Answer:
-    """An Answer with λ in [−tolerance, 0), which the library's own test allows, set to 0.
+def clipped(answer: Answer, tolerance: float) -> Answer:
+    """A copy of the answer with λ in [−tolerance, 0), which the library's own test allows, set to 0.
 
-    Larger negative values are kept, and the judge sees them. Values that are not finite are no answer.
+    Larger negative values are kept, and the judge sees them. Without λ, or with values that are not finite,
+    the answer is a failed one.
     """
-    lam = np.array(lam, dtype=float)
-    if not np.isfinite(lam).all() or (x is not None and not np.isfinite(x).all()):
-        return Answer("failed", None, **facts)
+    lam, x = (None if v is None else np.array(v, dtype=float) for v in (answer.lam, answer.x))
+    if lam is None or not np.isfinite(lam).all() or (x is not None and not np.isfinite(x).all()):
+        return replace(answer, status="failed", lam=None, x=None)
     lam[(lam < 0) & (lam >= -tolerance)] = 0.0
-    return Answer(status, lam, None if x is None else np.array(x, dtype=float), **facts)
+    return replace(answer, lam=lam, x=x)
 
 
 def rows_for_bounds(problem: Problem, sign: float) -> sp.csc_matrix:
@@ -143,10 +137,10 @@ def is_sparse(blocks: Sequence[Matrix]) -> bool:
 
 def sorted_csc(M: Any) -> sp.csc_matrix:
     """CSC with 32-bit indices, each column's rows in order."""
-    found = sp.csc_matrix(M)
-    found.sort_indices()
-    indices, indptr = found.indices.astype(np.int32), found.indptr.astype(np.int32)
-    return sp.csc_matrix((found.data, indices, indptr), shape=found.shape)
+    csc = sp.csc_matrix(M)
+    csc.sort_indices()
+    indices, indptr = csc.indices.astype(np.int32), csc.indptr.astype(np.int32)
+    return sp.csc_matrix((csc.data, indices, indptr), shape=csc.shape)
 
 
 def dense(blocks: Sequence[Matrix]) -> Matrix:

@@ -14,16 +14,13 @@ or solved several at a time by the function that `batched(state)` returns, if a 
 
 Only `solve` must be written: by default, the other steps pass on their argument, and `update` calls `setup`.
 The harness calls and times the steps; a solver never reads a clock, judges its answer or handles limits.
-
-Options of a method, and settings of a library that a user may choose (OSQP's scaling), are checked here.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
-from problems.errors import Fault, InputError
 from problems.forms import DENSE_FORMS as DENSE_FORMS
 from problems.forms import FORMS as FORMS
 from problems.forms import Form as Form
@@ -31,7 +28,6 @@ from problems.forms.assembly import DualLoadCase as DualLoadCase
 from problems.forms.assembly import LoadCase as LoadCase
 from problems.forms.assembly import Vector
 from problems.forms.problem import Problem as Problem
-from problems.input.bounded_types import unknown
 
 #: A solver's report on its own answer.
 Status = Literal["solved", "inaccurate", "iteration_limit", "failed"]
@@ -39,18 +35,28 @@ Status = Literal["solved", "inaccurate", "iteration_limit", "failed"]
 
 @dataclass(frozen=True)
 class Answer:
-    """What a solver returns.
+    """The answer of a solver to one load case.
 
-    lam : (m,) contact forces λ in N (the multipliers of Aᵀx ≤ g).
-    x : (n,) displacements in mm; None in the dual form, where x = K⁻¹(f − Aλ) is recovered.
-    iterations : outer iterations; in an active-set method, changes of the set.
-    inner_iterations : e.g. conjugate-gradient iterations.
-    reported_s : seconds by the solver's own clock, if it has one.
-    details : anything else to record, as JSON types.
+    Parameters
+    ----------
+    status : {"solved", "inaccurate", "iteration_limit", "failed"}
+        The solver's report on its own answer; the harness judges the answer itself.
+    lam : ndarray of shape (m,), optional
+        Contact forces λ ≥ 0 in N, the multipliers of Aᵀx ≤ g. None if there is no answer.
+    x : ndarray of shape (n,), optional
+        Displacements in mm. None in the dual form, where x = K⁻¹(f − Aλ) is recovered.
+    iterations : int, optional
+        Outer iterations; in an active-set method, changes of the set.
+    inner_iterations : int, optional
+        Inner iterations, for example of conjugate gradients.
+    reported_s : float, optional
+        Seconds by the solver's own clock, if it has one.
+    details : dict
+        All else to record, as JSON types. `products`: products with Q; `cause`: why it is not solved.
     """
 
     status: Status
-    lam: Vector | None
+    lam: Vector | None = None
     x: Vector | None = None
     iterations: int | None = None
     inner_iterations: int | None = None
@@ -60,13 +66,13 @@ class Answer:
     @property
     def cause(self) -> str | None:
         """The reason why it is not solved, in the words of the method or of its library, if they say one."""
-        said = [self.details.get(name) for name in ("cause", "message", "status")]
-        return None if self.status == "solved" else next((str(text) for text in said if text), None)
+        texts = [self.details.get(name) for name in ("cause", "message", "status")]
+        return None if self.status == "solved" else next((str(text) for text in texts if text), None)
 
 
 def failed(cause: str, iterations: int | None = None) -> Answer:
     """An answer without forces, and its cause."""
-    return Answer("failed", None, iterations=iterations, details={"cause": cause})
+    return Answer("failed", iterations=iterations, details={"cause": cause})
 
 
 #: (load cases of one assembly, tolerance) → an answer to each, in their order.
@@ -75,9 +81,18 @@ Batch = Callable[[Sequence[LoadCase], float], list[Answer]]
 
 @dataclass(frozen=True)
 class WarmStart:
-    """The answer to the solved load case nearest to the next one.
+    """The answer to the solved load case that is nearest to the next one.
 
-    load : that case. lam : (m,) N. gap : (m,) mm, y = g − Aᵀx = Qλ − p. x : (n,) mm; None in the dual form.
+    Parameters
+    ----------
+    load : LoadCase
+        The solved load case.
+    lam : ndarray of shape (m,)
+        Its contact forces λ in N.
+    gap : ndarray of shape (m,)
+        Its gaps y = g − Aᵀx = Qλ − p in mm.
+    x : ndarray of shape (n,), optional
+        Its displacements in mm; None in the dual form.
     """
 
     load: LoadCase
@@ -94,89 +109,151 @@ class DualStart(WarmStart):
 
 
 class Solver(ABC):
-    """Base of all solvers. Options are keyword arguments of the constructor, checked there."""
+    """Base of all solvers. Options are keyword arguments of the constructor, which checks them.
 
-    #: The forms that the solver takes; in the sparse one, blocks and G are SciPy's sparse arrays.
-    forms: ClassVar[tuple[Form, ...]] = DENSE_FORMS
-    #: The distribution of the library, if it has another name than the solver.
+    Attributes
+    ----------
+    forms : tuple of {"primal", "dual", "sparse"}
+        The forms that the solver takes. In the sparse one, blocks and G are SciPy's sparse arrays.
+    distribution : str, optional
+        The distribution of the library, if it has another name than the solver.
+
+    Notes
+    -----
+    The problem is min ½xᵀKx − fᵀx, Aᵀx ≤ g with K (n, n) in N/mm, A (n, m) and loads f (n,) in N,
+    g (m,) in mm. Its dual is min ½λᵀQλ − pᵀλ, λ ≥ 0 with Q = AᵀK⁻¹A in mm/N and p = AᵀK⁻¹f − g in mm.
+    All arrays are read-only and shared. Lengths, forces and the tolerance are scaled before the solver sees
+    them (problems/forms/solver_units.py).
+
+    Examples
+    --------
+    The primal–dual active set, which starts from the contacts that overlap without forces:
+
+    >>> import numpy as np
+    >>> from harness import solve
+    >>> from solvers.base import Answer, Solver
+    >>> class ActiveSet(Solver):
+    ...     forms = ("dual",)
+    ...
+    ...     def solve(self, ready, load, tolerance):
+    ...         Q, p, C = ready.Q, load.p, load.p > 0
+    ...         for k in range(100):
+    ...             lam = np.zeros_like(p)
+    ...             lam[C] = np.linalg.solve(Q[np.ix_(C, C)], p[C])
+    ...             wrong = np.where(C, lam < 0, Q @ lam < p)
+    ...             if not wrong.any():
+    ...                 return Answer("solved", lam, iterations=k)
+    ...             C = C ^ wrong
+    ...         return Answer("iteration_limit", lam)
+    >>> solve("gallery/three-part-stack", ActiveSet()).judgement.verdict
+    'within'
+    """
+
+    forms: tuple[Form, ...] = DENSE_FORMS
     distribution: ClassVar[str | None] = None
 
     def convert(self, problem: Problem) -> Any:
+        """Bring the data of an assembly into the library's own format; once per assembly.
+
+        Parameters
+        ----------
+        problem : Problem
+            The quadratic program in one of `forms`: its `assembly` (K, A), and `Q` or P as `blocks`.
+
+        Returns
+        -------
+        object
+            The argument of `prepare`; by default the problem itself.
+        """
         return problem
 
     def prepare(self, data: Any) -> Any:
+        """Factor and compute all that load cases share; once per assembly.
+
+        Parameters
+        ----------
+        data : object
+            The result of `convert`.
+
+        Returns
+        -------
+        object
+            The state for `setup`, `update` and `batched`, which do not change it; by default `data`.
+        """
         return data
 
     def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
+        """Set up the first load case of a series, or one that is solved by itself.
+
+        Parameters
+        ----------
+        state : object
+            The result of `prepare`.
+        load : LoadCase
+            f (n,) in N, g (m,) in mm, and p (m,) in mm in the dual form.
+        tolerance : float
+            The largest violation of the optimality conditions, in the sense of the solver's own test.
+
+        Returns
+        -------
+        object
+            The argument `ready` of `solve`; by default `state`.
+        """
         return state
 
     def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
-        """The argument `ready` of `solve` for another load case of the same assembly and tolerance.
+        """Set up a further load case of the same assembly and tolerance; by default by `setup`.
 
-        state : from `prepare`. ready : from `setup` or `update` for the case solved before this one; may be
-        changed and returned. start : a warm start, not necessarily from the case before.
+        Parameters
+        ----------
+        state : object
+            The result of `prepare`.
+        ready : object
+            The result of `setup` or `update` for the case solved before; may be changed and returned.
+        load : LoadCase
+            The next load case.
+        tolerance : float
+            The tolerance of the series.
+        start : WarmStart
+            A solved case from which to start, not necessarily the one before.
+
+        Returns
+        -------
+        object
+            The argument `ready` of `solve`.
         """
         return self.setup(state, load, tolerance)
 
     def batched(self, state: Any) -> Batch | None:
-        """A function that solves several load cases of the assembly at once; None if there is none.
+        """Return a function that solves several load cases of the assembly at once.
 
-        state : from `prepare`.
+        Parameters
+        ----------
+        state : object
+            The result of `prepare`.
+
+        Returns
+        -------
+        callable or None
+            (load cases, tolerance) → their answers in the same order. None if there is no such function.
         """
         return None
 
     @abstractmethod
-    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer: ...
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        """Solve a load case.
 
+        Parameters
+        ----------
+        ready : object
+            The result of `setup` or `update`.
+        load : LoadCase
+            The same load case.
+        tolerance : float
+            The largest violation of the optimality conditions, in the sense of the solver's own test.
 
-#: Beginnings of what the adapters decide: accuracy, limits, output.
-STOPPING = ("eps", "tol", "reduced_tol", "max_iter", "check_du", "time", "compute_timings")
-DECIDED = (*STOPPING, "verbose", "max_threads", "num_threads", "warm_start", "initial_guess")
-
-
-def require(solver: str, options: Mapping[str, object], **rules: tuple[bool, str]) -> None:
-    """Raises InputError, all faults at once. rules : by option, whether its value is allowed, and what is."""
-    faults = [
-        Fault(f"solver {solver}", f"options.{key}", options[key], allowed)
-        for key, (holds, allowed) in rules.items()
-        if not holds
-    ]
-    if faults:
-        raise InputError(faults)
-
-
-def one_of(value: object, allowed: Collection[object]) -> tuple[bool, str]:
-    """A rule: `value` is one of `allowed`, of the same type (1 is not True)."""
-    found = any(type(value) is type(good) and value == good for good in allowed)
-    return found, f"must be one of {', '.join(map(repr, allowed))}"
-
-
-def chosen(solver: str, given: Mapping[str, object], settings: object) -> dict[str, Any]:
-    """The settings given. settings : the library's own, at their defaults, on which they are tried.
-
-    Raises InputError, all faults at once.
-    """
-    known = {
-        name: value
-        for name in dir(settings)
-        if not name.startswith(("_", *DECIDED))
-        and isinstance(value := getattr(settings, name), bool | int | float | str)
-    }
-    require(solver, given, **{name: _of_its_type(name, value, known) for name, value in given.items()})
-    apply(settings, given)
-    return dict(given)
-
-
-def apply(settings: Any, given: Mapping[str, object]) -> None:
-    """Set them on the library's settings."""
-    for name, value in given.items():
-        setattr(settings, name, value)
-
-
-def _of_its_type(name: str, value: object, known: Mapping[str, object]) -> tuple[bool, str]:
-    if name not in known:
-        return False, unknown("option", name, sorted(known))
-    kind = type(known[name])
-    # bool is an int, and an int a float where one is meant.
-    fits = type(value) is kind or (kind is float and type(value) is int)
-    return fits, f"must be of the type of its default {known[name]!r}"
+        Returns
+        -------
+        Answer
+            λ, in the primal and the sparse form x as well, and the status.
+        """

@@ -1,6 +1,6 @@
-"""The KKT residual of an approximate dual solution, and the answer that it makes.
+"""The KKT residual of an approximate dual solution, and the status of the answer that follows from it.
 
-In the sparse form the answer is judged by its x (`with_x`).
+In the sparse form x decides the status (`with_x`).
 """
 
 from collections.abc import Sequence
@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector, stacked
-from problems.forms.prepared import Prepared
 
-from .base import Answer, LoadCase, Status
+from .base import Answer, LoadCase, Problem, Status
 
 EPS = float(np.finfo(float).eps)
-ROUNDING_MM = 1e-7  # what x may be off: a δ beyond is an error, not rounding
+ROUNDING_MM = 1e-7  # the largest δ that is taken for rounding
 
 
 def kkt_residual(lam: Vector, y: Vector) -> float:
@@ -40,7 +39,7 @@ def kkt_status(Q: Matrix, p: Vector, lam: Vector, y: Vector, tolerance: float) -
     return "solved" if residual <= rounding else "inaccurate", residual
 
 
-def judged(
+def dual_answer(
     status: Status,
     lam: Vector,
     residual: float,
@@ -51,7 +50,7 @@ def judged(
     iterations: int,
     inner_iterations: int | None = None,
 ) -> Answer:
-    """The answer λ with its KKT residual in the details, and with the cause if it is not solved.
+    """The answer of a method on the dual form, with its KKT residual, and the cause if it is not solved.
 
     limit : the one that stopped the method, if one did: "inaccurate" then becomes "iteration_limit".
     """
@@ -69,33 +68,35 @@ def largest_rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:
 
 
 def with_x(
-    prepared: Prepared, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float
+    problem: Problem, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float
 ) -> list[Answer]:
-    """With x = K⁻¹(f − Aλ) refined by δ, and judged by it: "solved" if the KKT residual of y = g − Aᵀx is at
-    most max(tolerance, min(4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|), ROUNDING_MM)).
+    """The answers, in the sparse form with x = K⁻¹(f − Aλ) refined by δ, and the status of this x.
+
+    "solved" if the KKT residual of y = g − Aᵀx is at most
+    max(tolerance, min(4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|), ROUNDING_MM)).
     """
-    known = [k for k, answer in enumerate(answers) if answer.lam is not None]
-    found = list(answers)
-    if not known:
-        return found
-    assembly, cases = prepared.assembly, stacked([loads[k] for k in known])
-    lam = np.column_stack([np.asarray(answers[k].lam) for k in known])
+    with_lam = [k for k, answer in enumerate(answers) if answer.lam is not None]
+    refined = list(answers)
+    if problem.bounded or not with_lam:
+        return refined
+    assembly, cases = problem.assembly, stacked([loads[k] for k in with_lam])
+    lam = np.column_stack([np.asarray(answers[k].lam) for k in with_lam])
     b = cases.f - assembly.A @ lam
-    x = prepared.assembly.K.solve(b)
-    delta = prepared.assembly.K.solve(b - assembly.K.multiply(x))
+    x = assembly.K.solve(b)
+    delta = assembly.K.solve(b - assembly.K.multiply(x))
     x = x + delta
     y, size = cases.g - assembly.A.T @ x, abs(assembly.A).T
     rounding = 4 * (EPS * (abs(cases.g) + size @ abs(x)) + size @ abs(delta)).max(axis=0)
     missed = np.where(lam > 0, abs(y), -y).max(axis=0, initial=0.0)
-    for column, k in enumerate(known):
-        status, residual = found[k].status, float(missed[column])
+    for column, k in enumerate(with_lam):
+        status, residual = refined[k].status, float(missed[column])
         if status in ("solved", "inaccurate"):
             allowed = max(tolerance, min(rounding[column], ROUNDING_MM))
             status = "solved" if residual <= allowed else "inaccurate"
-        details = found[k].details | {"kkt_residual_mm": residual}
+        details = refined[k].details | {"kkt_residual_mm": residual}
         if status == "solved":
             details.pop("cause", None)
         elif "cause" not in details:
             details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
-        found[k] = replace(found[k], status=status, x=x[:, column], details=details)
-    return found
+        refined[k] = replace(refined[k], status=status, x=x[:, column], details=details)
+    return refined

@@ -1,8 +1,8 @@
-"""What the methods of this project share: a start, and a failed answer where a matrix is indefinite."""
+"""The base of this project's methods: a start, and a failed answer where a matrix is indefinite."""
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .base import Answer, DualLoadCase, DualStart, Form, LoadCase, Problem, Solv
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """What load cases share. start : the solved case to start from, if there is one."""
+    """The data that load cases share. start : the solved case to start from, if there is one."""
 
     problem: Problem
     start: WarmStart | None = None
@@ -34,9 +34,9 @@ class State:
 
 
 class Method(Solver):
-    """Base of the methods: `state` and `solved` may raise LinAlgError, which makes a failed answer."""
+    """Base of the methods. A LinAlgError in `state` or `solved` makes a failed answer."""
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+    forms: tuple[Form, ...] = ("dual",)
 
     def prepare(self, data: Problem) -> Any:
         """The state; a failed answer if Q or K is not positive definite."""
@@ -59,7 +59,7 @@ class Method(Solver):
             return failed(str(error))
 
     def state(self, problem: Problem) -> Any:
-        """What load cases share: a `State`, or an answer if there can be no other."""
+        """The data that load cases share: a `State`, or a failed answer for all of them."""
         return State(problem=problem)
 
     @abstractmethod

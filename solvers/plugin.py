@@ -44,26 +44,26 @@ def load_plugin(path: Path) -> type[Solver]:
     return solver_class(module, path)
 
 
-def own_files(path: Path) -> list[Path]:
-    """The file and the user's own code that it imports, directly or not, at its head or when it solves.
+def plugin_files(path: Path) -> list[Path]:
+    """The plug-in's file and the files of the user's code that it imports, directly or not.
 
-    The user's own lies in the file's folder or in one of sys.path, which the plug-in may have extended, and
-    is neither installed nor of this project. A string that names a module or a file of code there is taken
-    for an import of it. Names that are computed, and files of data, are not seen.
+    The user's code lies in the file's folder or in a folder of sys.path, and is neither installed nor part of
+    this project. A string that names a module or a file of code there counts as an import. Computed names and
+    files of data do not count.
     """
     path = path.resolve()
-    folders = {path.parent, *_own_folders()}
-    found: set[Path] = set()
+    folders = {path.parent, *_user_folders()}
+    files: set[Path] = set()
     unread = [path]
     while unread:
         file = unread.pop()
-        if file not in found:
-            found.add(file)
-            unread += [each.resolve() for each in _imported(file, folders)]
-    return sorted(found)
+        if file not in files:
+            files.add(file)
+            unread += [imported.resolve() for imported in _imported(file, folders)]
+    return sorted(files)
 
 
-def _own_folders() -> Iterator[Path]:
+def _user_folders() -> Iterator[Path]:
     """The folders of sys.path that hold neither the standard library nor installed packages."""
     standard = Path(sysconfig.get_path("stdlib"))
     for folder in map(Path, sys.path):
@@ -89,12 +89,12 @@ def _imported(file: Path, folders: Iterable[Path]) -> Iterator[Path]:
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             names = [node.value]
             if node.value.endswith(tuple(all_suffixes())):
-                yield from (each for folder in folders if (each := folder / node.value).is_file())
+                yield from (path for folder in folders if (path := folder / node.value).is_file())
         else:
             continue
         for parts in (name.split(".") for name in names):
-            own = within is not folders or parts[0] not in PROJECT
-            if own and all(part.isidentifier() or part == "*" for part in parts):
+            users = within is not folders or parts[0] not in PROJECT
+            if users and all(part.isidentifier() or part == "*" for part in parts):
                 yield from _modules(within, parts)
 
 
@@ -104,7 +104,7 @@ def _modules(folders: Iterable[Path], parts: list[str]) -> Iterator[Path]:
         for k in range(1, len(parts) + 1):
             place = folder.joinpath(*parts[:k])
             files = (f"{name}{suffix}" for suffix in all_suffixes() for name in (place, place / "__init__"))
-            yield from (Path(each) for each in files if Path(each).is_file())
+            yield from (Path(file) for file in files if Path(file).is_file())
 
 
 def solver_class(module: ModuleType, path: Path) -> type[Solver]:
@@ -112,17 +112,17 @@ def solver_class(module: ModuleType, path: Path) -> type[Solver]:
 
     Raises InputError if there is none, or more than one.
     """
-    own = [
+    defined = [
         cls
         for cls in vars(module).values()
         if inspect.isclass(cls) and issubclass(cls, Solver) and cls.__module__ == module.__name__
     ]
-    complete = [cls for cls in own if not inspect.isabstract(cls)]
+    complete = [cls for cls in defined if not inspect.isabstract(cls)]
     if len(complete) == 1:
         return complete[0]
-    names = ", ".join(cls.__name__ for cls in complete or own) or None
+    names = ", ".join(cls.__name__ for cls in complete or defined) or None
     allowed = "the file must define a subclass of Solver (from solvers.base import Solver)"
-    if own:
+    if defined:
         allowed = "the subclass of Solver must define solve(self, ready, load, tolerance)"
     if complete:
         allowed = "must be one subclass of Solver, not several"

@@ -21,8 +21,9 @@ from problems import __version__
 from problems.errors import InputError
 from problems.input.bounded_types import unknown
 
-from .base import Solver, require
-from .plugin import load_plugin, own_files, solver_class
+from .base import Solver
+from .options import NO_OPTIONS, require
+from .plugin import load_plugin, plugin_files, solver_class
 
 #: Who stands behind a solver.
 Owner = Literal["ours", "textbook", "library"]
@@ -38,12 +39,12 @@ QPSOLVERS = "qpsolvers"
 @cache
 def modules() -> dict[str, str]:
     """Solver → module, not yet imported: the methods of this project, the textbook's, then the libraries."""
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for package in PACKAGES.values():
         path = importlib.import_module(package).__path__
         names = sorted(module.name for module in pkgutil.iter_modules(path) if module.name != QPSOLVERS)
-        found |= {name.replace("_", "-"): f"{package}.{name}" for name in names}
-    return found
+        by_name |= {name.replace("_", "-"): f"{package}.{name}" for name in names}
+    return by_name
 
 
 def owner_of(name: str) -> Owner:
@@ -66,10 +67,8 @@ def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) 
     factory = _factory(name, plugin)
     parameters = inspect.signature(factory).parameters
     if not any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
-        known = (
-            f"one of the options {', '.join(parameters)}" if parameters else "this solver takes no options"
-        )
-        wrong = (False, f"unknown option, allowed: {known}")
+        allowed = f"one of the options {', '.join(parameters)}" if parameters else NO_OPTIONS
+        wrong = (False, f"unknown option, allowed: {allowed}")
         require(name, options, **{key: wrong for key in options if key not in parameters})
     try:
         return factory(**options)
@@ -82,7 +81,7 @@ def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) 
 def solver_version(name: str, plugin: Path | None = None) -> str:
     """The version of the library; for a plug-in a hash of its own files; "unknown" if there is none."""
     if plugin is not None and name == plugin.stem:
-        contents = sorted(hashlib.sha256(file.read_bytes()).digest() for file in own_files(plugin))
+        contents = sorted(hashlib.sha256(file.read_bytes()).digest() for file in plugin_files(plugin))
         return "sha256:" + hashlib.sha256(b"".join(contents)).hexdigest()[:12]
     if name in modules():
         distribution = _class_of(name).distribution

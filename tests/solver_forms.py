@@ -1,5 +1,8 @@
 """Every solver of the registry in each of its forms, and how far from the exact answer it may end."""
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 from exact_draws import ExactLoad
 
@@ -9,14 +12,16 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer, Form
+from solvers.libraries.qpsolvers import DISTRIBUTIONS
 from solvers.registry import make_solver, modules, owner_of, solver_names
 
 COMPLIANCE = 0.1  # mm/N, as in ipm's CONTACT_COMPLIANCE
 
-#: Those of the project and of its extra `extra-solvers`: what else is installed decides about no test.
-TESTED = [
-    name for name in solver_names() if name in {*modules(), "daqp", "highs", "qpalm", "quadprog", "scs"}
-]
+PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))["project"]
+REQUIRED = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["extra-solvers"]]
+INSTALLED = {requirement.partition(">")[0] for requirement in REQUIRED}
+#: The solvers of the package and those that it requires: what else is installed decides about no test.
+TESTED = [n for n in solver_names() if n in modules() or DISTRIBUTIONS.get(n, n) in INSTALLED]
 CASES: list[tuple[str, Form]] = [(name, form) for name in TESTED for form in make_solver(name, {}).forms]
 #: Its steps grow with cond(Q): it may give up, but must not be wrong.
 SLOW = ("projected-gauss-seidel",)

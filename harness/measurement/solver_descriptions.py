@@ -28,7 +28,7 @@ from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from problems.storage import ROOT, fingerprint
 from solvers.base import Form, Solver
-from solvers.plugin import own_files
+from solvers.plugin import plugin_files
 from solvers.registry import make_solver, owner_of, solver_version
 
 from .child_process import Events
@@ -156,7 +156,7 @@ def code_of(solver: Solver) -> str:
     plug-in also what it imports of the user's own. The version of the library is a field of its own.
     """
     file = Path(inspect.getfile(type(solver)))
-    files = [file] if ROOT / "solvers" in file.parents else own_files(file)
+    files = [file] if ROOT / "solvers" in file.parents else plugin_files(file)
     return fingerprint(files, within=["solvers"])
 
 

@@ -1,14 +1,16 @@
 """One look for all figures, readable in greyscale and by colour-blind readers.
 
-A solver keeps its colour and marker in every figure of every report. Its forms differ in dashes and in the
-face of the marker, its variants in tint and the part of the marker that is filled. The colours are
-those of Okabe and Ito (2008), without their yellow; those of our solvers are told apart without their markers
-too, also by colour-blind readers (tests/report/test_figures.py).
+A solver keeps its colour and marker in every figure of every report: a fixed pair, or one that follows from
+its name. Its forms differ in dashes and in the face of the marker, its variants in tint and the filled part
+of the marker. The colours are those of Okabe and Ito (2008), without their yellow, and some more. The fixed
+colours of our solvers are told apart without markers, also by colour-blind readers.
 """
 
 from __future__ import annotations
 
 import math
+import zlib
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -35,15 +37,15 @@ WIDTH = 9.0  # inches; at 100 pixels per inch the width of a page of text on a s
 DPI = 160
 COLUMNS = 4  # of a legend below a figure
 
-#: The solvers of the published reports, which look the same in all of them.
-KNOWN = {
+#: Colour and marker of the solvers for which they were chosen. Any other solver needs no entry: see `looks`.
+FIXED = {
     "ipm": (BLUE, "o"),
     "gi": (VERMILLION, "s"),
     "newton": (BLACK, "*"),
     "ipm-fast": (ROSE, "o"),
     "mprgp": (INDIGO, "v"),
-    "projected-newton": (BROWN, "d"),
-    "lemke": (PINK, "H"),
+    "nnls": (BROWN, "d"),
+    "l-bfgs-b": (PINK, "H"),
     "projected-gauss-seidel": (CYAN, "8"),
     "textbook-active-set": (MUSTARD, "<"),
     "piqp": (GREEN, "D"),
@@ -54,9 +56,13 @@ KNOWN = {
     "quadprog": (GREEN, "<"),
     "highs": (PURPLE, ">"),
 }
-#: For all other solvers, by name; each pair differs from those above, and black is newton's alone. Open
-#: triangles mark unfinished runs.
-SPARE = [(color, marker) for marker in "dvH8" for color in (GREY, OLIVE, BLUE, ORANGE, VERMILLION, SKY)]
+#: The pairs of all other solvers. Open triangles mark unfinished runs, and black is newton's alone.
+SPARE = [
+    (color, marker)
+    for marker in "dvH8oshpDPX<>"
+    for color in (GREY, OLIVE, BLUE, ORANGE, VERMILLION, SKY, GREEN, PURPLE, CYAN, ROSE, INDIGO, BROWN)
+    if (color, marker) not in FIXED.values()
+]
 #: Marker size, tint (0: the full colour, 1: white) and filled part of the marker of a solver's first,
 #: second, … variant of a form.
 VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "right"]], ...] = (
@@ -130,13 +136,25 @@ def panels(
     return drawing, list(drawing.subplots(count, 1, squeeze=False, sharex=sharex)[:, 0])
 
 
+def looks(solvers: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Colour and marker of each solver, different for up to some hundred of them.
+
+    A solver without a fixed pair has the spare one at the checksum of its name, or the next that is free.
+    """
+    pairs = dict(FIXED)
+    for solver in sorted(set(solvers) - set(FIXED)):
+        place = zlib.crc32(solver.encode()) % len(SPARE)
+        free = (pair for pair in SPARE[place:] + SPARE[:place] if pair not in pairs.values())
+        pairs[solver] = next(free, SPARE[place])
+    return pairs
+
+
 def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Keyword arguments of `Axes.plot` for each method of some cells."""
-    unknown = sorted(set(cells["solver"]) - set(KNOWN))
-    looks = KNOWN | {solver: SPARE[i % len(SPARE)] for i, solver in enumerate(unknown)}
     styles: dict[str, dict[str, Any]] = {}
+    pairs = looks(cells["solver"])
     for (solver, form), lines in cells.groupby(["solver", "form"]):
-        full, marker = looks[solver]
+        full, marker = pairs[str(solver)]
         dashes, face = LOOKS.get(str(form), LOOKS["sparse"])
         for i, method in enumerate(sorted(lines["method"].unique())):
             size, tint, filled = VARIANTS[i % len(VARIANTS)]

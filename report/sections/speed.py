@@ -128,6 +128,8 @@ def _growth(within: pd.DataFrame) -> Drawing:
     return drawing
 
 
+#: The methods whose rows before version 0.4.0 give the products with Q as their iterations alone.
+COUNTED_AS_ITERATIONS = ("newton",)
 BY_SCENE = (
     "*Time and products with Q*: seconds per load case, and in brackets the products with Q per load case, "
     "where a method counts them. Of several tolerances, the fastest within the limit, else the least wrong. "
@@ -150,12 +152,12 @@ def methods(results: Results) -> Section | None:
 
 
 def _products(cell: Mapping[str, Any]) -> float:
-    """As the method counted them; the iterations of newton are products with Q."""
+    """The products with Q that the method counted; NaN if it counts none."""
     details = cell.get("details")
-    found = details.get("products") if isinstance(details, Mapping) else None
-    if found is None and cell["solver"] == "newton" and cell["status"] == "solved":
-        found = cell["iterations"]
-    return float("nan") if found is None else float(found)
+    products = details.get("products") if isinstance(details, Mapping) else None
+    if products is None and cell["solver"] in COUNTED_AS_ITERATIONS and cell["status"] == "solved":
+        products = cell["iterations"]
+    return float("nan") if products is None else float(products)
 
 
 def _line(cells: pd.DataFrame) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Block principal pivoting: finds the contact set C with λ ≥ 0 on it and y ≥ 0 off it.
 
-Whatever solves the equations of a set may be given to it; `solve_from` takes Cholesky factors of Q_CC.
+The equations of a set are solved by a function; that of `solve_from` takes Cholesky factors of Q_CC.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import scipy.linalg as sla
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.stiffness.dense_block import product
 from solvers.base import Answer
-from solvers.kkt import judged, kkt_status, rounding_of
+from solvers.kkt import dual_answer, kkt_status, rounding_of
 
 MAX_SETS = 1000  # of `solve_from`
 MAX_STALE_PASSES = 2  # passes without a new smallest count of wrong signs, before steps of descent
@@ -33,7 +33,7 @@ class TrialSolution:
 class PivotingResult:
     """The contact set, its λ and y, the sets tried, the steps of descent, and whether every sign is right.
 
-    creeps : whether it was given up, as more than 3/5 of the signs that were wrong a set before still were.
+    creeps : whether it was given up, because a pass left more than 3/5 of the wrong signs.
     """
 
     C: Mask
@@ -58,7 +58,7 @@ def block_pivoting(
     passes: int,
     patience: int | None = None,
 ) -> PivotingResult:
-    """Start from C and try at most `passes` sets. patience : the set at which it is seen whether it creeps.
+    """Pivots from C, at most `passes` sets. patience : the pass after which it is given up if it creeps.
 
     Each pass exchanges every index with a wrong sign. A pass without a new smallest count of these only opens
     contacts, as long as a force is negative, and closes contacts once none is (as Hungerländer and Rendl 2015
@@ -72,8 +72,8 @@ def block_pivoting(
     for k in range(1, passes + 1):
         trial = at(C)
         wrong = wrong_signs(C, trial, compliance, tolerance)
-        before, count, negative = count, int(wrong.sum()), wrong & C
-        creeps = k == patience and 5 * count > 3 * before
+        last_count, count, negative = count, int(wrong.sum()), wrong & C
+        creeps = k == patience and 5 * count > 3 * last_count
         if not count or k == passes or creeps:
             break
         fewest, stale = (count, 0) if count < fewest else (fewest, stale + 1)
@@ -93,9 +93,9 @@ def _towards(aim: Vector, lam: Vector, negative: Mask) -> Vector:
     """From λ ≥ 0 towards `aim` until the first of its negative entries is zero, exactly."""
     share = np.full(len(lam), np.inf)
     share[negative] = lam[negative] / (lam - aim)[negative]
-    found: Vector = np.maximum(lam + share.min() * (aim - lam), 0.0)
-    found[share == share.min()] = 0.0
-    return found
+    new: Vector = np.maximum(lam + share.min() * (aim - lam), 0.0)
+    new[share == share.min()] = 0.0
+    return new
 
 
 def solve_from(C: Mask, Q: Matrix, p: Vector, tolerance: float) -> Answer:
@@ -104,13 +104,13 @@ def solve_from(C: Mask, Q: Matrix, p: Vector, tolerance: float) -> Answer:
     A sign is wrong beyond ten times the rounding of y = Qλ − p. See `kkt.kkt_status` for "solved" and
     "inaccurate". Iterations are contact sets. Raises LinAlgError if some Q_CC is not positive definite.
     """
-    found = block_pivoting(lambda C: forces_on(C, Q, p), C, np.diag(Q), 0.0, MAX_SETS)
-    lam, y = np.maximum(found.trial.lam, 0.0), found.trial.y
-    if (found.trial.lam < 0).any():
+    result = block_pivoting(lambda C: forces_on(C, Q, p), C, np.diag(Q), 0.0, MAX_SETS)
+    lam, y = np.maximum(result.trial.lam, 0.0), result.trial.y
+    if (result.trial.lam < 0).any():
         y = product(Q, lam) - p
     status, residual = kkt_status(Q, p, lam, y, tolerance)
-    limit = "" if found.converged else f"{MAX_SETS} contact sets"
-    return judged(status, lam, residual, {"closed": int(found.C.sum())}, limit, iterations=found.passes)
+    details, limit = {"closed": int(result.C.sum())}, "" if result.converged else f"{MAX_SETS} contact sets"
+    return dual_answer(status, lam, residual, details, limit, iterations=result.passes)
 
 
 def forces_on(C: Mask, Q: Matrix, p: Vector) -> TrialSolution:
@@ -122,9 +122,9 @@ def forces_on(C: Mask, Q: Matrix, p: Vector) -> TrialSolution:
         lam = best.lam.copy()
         lam[rows] -= sla.cho_solve(factor, best.y[rows], check_finite=False)
         y = product(Q, lam) - p
-        before, missed = best.rounding, float(abs(y[rows]).max())
-        if missed < before:
+        previous, missed = best.rounding, float(abs(y[rows]).max())
+        if missed < previous:
             best = TrialSolution(lam, y, missed)
-        if not missed <= before / 2:
+        if not missed <= previous / 2:
             break
     return replace(best, rounding=max(best.rounding, rounding_of(p, best.y)))

@@ -10,8 +10,8 @@ by a few contact sets of block principal pivoting, each a band factorisation, an
 load cases in one product. A sweep reduces the error by max|1 − eig(MQ)|, about 0.1 on a joint of plates. On a
 set that no longer changes, sweeps are steps of the conjugate gradient method preconditioned with M, and y
 follows by its change Q(λ⁺ − λ), whose rounding shrinks with it: that of Qλ⁺ − p would come back in every
-sweep, M's error carrying it into soft modes, up to √cond(Q) times as large. But where y was last computed at
-far larger forces, it is computed anew.
+sweep, M's error carrying it into soft modes, up to √cond(Q) times as large. `doubt` bounds
+the rounding that y has accumulated; above twice that of a fresh Qλ − p, y is recomputed.
 
 A case starts from λ + αw, w = D⁻¹Aᵀδf, D = diag(AᵀA), δf its load less that of the case before, or all of it.
 What fasteners press on two parts is a sum of columns of A: then δf = Aw, Qw = δp + δg takes no product, and
@@ -31,7 +31,7 @@ import numpy as np
 from problems.forms.assembly import Mask, Vector
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, DualLoadCase, DualStart, Status
-from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
+from solvers.kkt import EPS, dual_answer, kkt_residual, largest_rounding, rounding_of
 
 from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
 from .contact_sets import ContactSprings, OpenFactor, banded_set, yielding_set
@@ -49,17 +49,18 @@ STEP_RANGE = 0.5, 2.0  # on an unchanged set; beyond it, a step is rounding
 class Case:
     """A load case during the sweeps, its vectors in the order of M.
 
-    C : its contact set. trial : λ (m,) N, y (m,) mm, and |y_C|. factor : of M on the open contacts. before :
-    the last step and Q times it, if the set was the one before. residual : max(|y_C|, max(−y)). stalled :
-    sweeps in succession that did not halve it. settled : no sign is wrong, and it is small enough. doubt :
-    the rounding that y has brought along since it was last computed anew, mm; infinite if y is not known.
+    C : its contact set. trial : λ (m,) N, y (m,) mm, and |y_C|. factor : of M on the open contacts.
+    last_step : the last step and Q times it, if it left the set unchanged. residual : max(|y_C|, max(−y)).
+    stalled : sweeps in succession that did not halve it. settled : whether every sign is right and the
+    residual small enough. doubt : a bound of the rounding that y has accumulated since it was last computed
+    from λ, mm; infinite if y is not known.
     """
 
     load: DualLoadCase
     C: Mask
     trial: TrialSolution
     factor: OpenFactor | None = None
-    before: tuple[Vector, Vector] | None = None
+    last_step: tuple[Vector, Vector] | None = None
     residual: float = np.inf
     doubt: float = np.inf
     stalled: int = 0
@@ -70,9 +71,10 @@ class Case:
 
 @dataclass
 class Sweeps:
-    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; factorisations of K where there is no M.
+    """Solves load cases of one assembly with M ≈ Q⁻¹, or with factorisations of K where there is no M.
 
-    last : the cases solved last, from which the next ones start.
+    diagonal : of Q, or about that, (m,) mm/N. order : of the contacts in M. compliance : the diagonal in this
+    order. last : the cases solved last, from which the next ones start.
 
     A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ), ρ the rounding of
     Qλ − p (`kkt.largest_rounding`), and r = max(|y_C|, max(−y)) is at most 0.02 tolerance; or does not halve
@@ -86,7 +88,7 @@ class Sweeps:
         near = self.prepared.approximate_inverse
         self.M, self.diagonal, self.gaps = near.M, near.diagonal, self.prepared.gaps
         self.order = np.arange(len(near.diagonal)) if near.M is None else near.M.order
-        self.own = near.diagonal[self.order]
+        self.compliance = near.diagonal[self.order]
         self.A = self.prepared.assembly.A
         self.squares = np.asarray(self.A.power(2).sum(axis=0)).ravel()
 
@@ -96,16 +98,16 @@ class Sweeps:
         return ContactSprings(self.prepared)
 
     def __call__(self, loads: Sequence[DualLoadCase], tolerance: float) -> list[Answer]:
-        """An answer to each load, solved together, each from the nearest of the last cases."""
-        nearest = [_nearest(self.last, load) for load in loads if self.last]
+        """The answers to several loads, solved together, each from the nearest of the last cases."""
+        nearest = [min(self.last, key=partial(_distance, load)) for load in loads if self.last]
         self.last = self.together(loads, tolerance, nearest)
         return [self.answer(case, tolerance) for case in self.last]
 
     def together(
         self, loads: Sequence[DualLoadCase], tolerance: float, starts: Sequence[Case] = ()
     ) -> list[Case]:
-        """The cases of some loads, solved together, each from its start; without starts, all from the
-        solution of the first load.
+        """The cases of several loads, solved together. starts : a solved case for each load; by default all
+        start from the solution of the first load.
         """
         starts = starts or [self.solved(loads[0], tolerance)] * len(loads)
         cases = self._sweep(self._begun(starts, loads), tolerance)
@@ -116,7 +118,7 @@ class Sweeps:
     def solved(
         self, load: DualLoadCase, tolerance: float, start: DualStart | None = None, C: Mask | None = None
     ) -> Case:
-        """The case of a load, from nothing or from a solved one. C : its first set, if it is known."""
+        """The solved case of a load. start : the case it starts from. C : its first contact set."""
         order = self.order
         if start is None:
             zero = np.zeros(len(order))
@@ -125,18 +127,17 @@ class Sweeps:
             case.C = case.C | (case.trial.y < 0) if self.M is not None else self.springs.first_set(load)
         else:
             lam, y = start.lam[order], start.gap[order]
-            solved = Case(start.load, self.own * lam > y, TrialSolution(lam, y, 0.0))
+            solved = Case(start.load, self.compliance * lam > y, TrialSolution(lam, y, 0.0))
             (case,) = self._begun([solved], [load])
         if C is not None:
             case.C = C[order]
         return self._sweep([case], tolerance)[0]
 
     def answer(self, case: Case, tolerance: float) -> Answer:
-        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew if
-        the rounding that it brought along decides, or a force was below zero.
+        """The answer of a solved case. Iterations are products with Q, inner iterations sets tried with M.
 
-        "solved" if max(max(−y), max_{λ>0} |y|), and that rounding where y is not, is at most max(tolerance,
-        `kkt.largest_rounding`) mm.
+        "solved" if r = max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm. y is
+        recomputed from λ if r + doubt exceeds the tolerance, or if a force was below zero.
         """
         lam, y = self.vectors(case)
         residual = kkt_residual(lam, y) + case.doubt
@@ -146,7 +147,7 @@ class Sweeps:
         enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
         limit = "" if case.settled else f"{MAX_SWEEPS} products"
         status: Status = "solved" if enough else "inaccurate"
-        return judged(
+        return dual_answer(
             status,
             lam,
             residual,
@@ -163,12 +164,12 @@ class Sweeps:
         return lam, y
 
     def _begun(self, solved: Sequence[Case], loads: Sequence[DualLoadCase]) -> list[Case]:
-        """Load cases that start from the solutions of others, and from the forces αw of a change of f."""
+        """Load cases that start from solved ones plus the forces αw of the change of f."""
         changes = [load - case.load for case, load in zip(solved, loads, strict=True)]
         w = np.column_stack([self.A.T @ change.f / self.squares for change in changes])
-        left = np.column_stack([change.f for change in changes]) - self.A @ w
+        uncarried = np.column_stack([change.f for change in changes]) - self.A @ w
         Qw = np.column_stack([change.p + change.g for change in changes])  # where δf = Aw
-        some = np.flatnonzero(left.any(axis=0) & w.any(axis=0))
+        some = np.flatnonzero(uncarried.any(axis=0) & w.any(axis=0))
         if len(some):
             Qw[:, some] = self.gaps(np.asfortranarray(w[:, some]), [changes[k] - changes[k] for k in some])
         begun = []
@@ -180,42 +181,40 @@ class Sweeps:
             C = np.where(force == 0, case.C, lam > 0)
             factor = None if case.factor is None else case.factor.copy()
             trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
-            doubt = case.doubt + largest_rounding(self.own, load.p[self.order], lam)
+            doubt = case.doubt + largest_rounding(self.compliance, load.p[self.order], lam)
             begun.append(Case(load, C, trial, factor, doubt=doubt))
         return begun
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
         order = self.order
-        left = cases
+        active = cases
         for _ in range(MAX_SWEEPS):
-            found = [self._step(case) for case in left]
-            kept = [
-                same and case.doubt <= SMALL * largest_rounding(self.own, case.load.p[order], lam)
-                for case, (lam, same) in zip(left, found, strict=True)
-            ]
-            moved = np.empty((len(order), len(left)), order="F")
+            steps = []  # λ, whether the set is unchanged, and whether y follows by its change
+            for case in active:
+                lam, same = self._step(case)
+                rounding = largest_rounding(self.compliance, case.load.p[order], lam)
+                steps.append((case, lam, same, same and case.doubt <= SMALL * rounding))
+            moved = np.empty((len(order), len(active)), order="F")
             moved[order] = np.column_stack(
-                [
-                    lam - case.trial.lam if k else lam
-                    for case, (lam, _), k in zip(left, found, kept, strict=True)
-                ]
+                [lam - case.trial.lam if change else lam for case, lam, _, change in steps]
             )
-            loads = [case.load - case.load if k else case.load for case, k in zip(left, kept, strict=True)]
+            loads = [case.load - case.load if change else case.load for case, _, _, change in steps]
             y = self.gaps(moved, loads)[order].T
-            for case, (lam, same), gap, k in zip(left, found, y, kept, strict=True):
+            for (case, lam, same, change), gap in zip(steps, y, strict=True):
                 # A part of a step would leave λ off C, or keep a part of a y that is not that of its λ.
-                same &= k and not case.trial.lam[~case.C].any()
-                if not k:
+                whole = same and change and not case.trial.lam[~case.C].any()
+                if not change:
                     case.doubt = rounding_of(case.load.p[order], gap)
-                self._take(case, lam, case.trial.y + gap if k else gap, same, tolerance)
-            left = [case for case in left if not case.settled]
-            if not left:
+                self._take(case, lam, case.trial.y + gap if change else gap, whole, tolerance)
+            active = [case for case in active if not case.settled]
+            if not active:
                 break
         return cases
 
     def _step(self, case: Case) -> tuple[Vector, bool]:
-        """λ (m,) of the case with Q replaced by M⁻¹, and whether its set is the one before; on such a set it
-        is conjugate to the last step.
+        """λ (m,) of the case with Q replaced by M⁻¹, and whether the contact set is unchanged.
+
+        On an unchanged set the step is made conjugate to the last one.
         """
         at: Callable[[Mask], TrialSolution]
         if self.M is None:
@@ -223,39 +222,39 @@ class Sweeps:
         else:
             case.factor = case.factor or OpenFactor(self.M)
             at = partial(banded_set, case.factor, case.trial)
-        floor = largest_rounding(self.own, case.load.p[self.order], case.trial.lam)
+        floor = largest_rounding(self.compliance, case.load.p[self.order], case.trial.lam)
         most, begins = int(FIRST_SETS * GROWTH**case.sweeps), self.M if case.sweeps == 0 else None
-        found = block_pivoting(at, case.C, self.own, floor, most, PATIENCE if begins else None)
-        if begins and found.creeps:
-            case.sets += found.passes
-            C = yielding_set(begins, self.own, case.trial)
-            found = block_pivoting(at, C, self.own, floor, PATIENCE)
-        unchanged = not (case.C ^ found.C).any()
-        case.C, case.sets = found.C, case.sets + found.passes
-        lam = found.trial.lam
-        if unchanged and case.before is not None:
-            step, change = case.before
+        result = block_pivoting(at, case.C, self.compliance, floor, most, PATIENCE if begins else None)
+        if begins and result.creeps:
+            case.sets += result.passes
+            C = yielding_set(begins, self.compliance, case.trial)
+            result = block_pivoting(at, C, self.compliance, floor, PATIENCE)
+        unchanged = not (case.C ^ result.C).any()
+        case.C, case.sets = result.C, case.sets + result.passes
+        lam = result.trial.lam
+        if unchanged and case.last_step is not None:
+            step, change = case.last_step
             lam = lam - ((lam - case.trial.lam) @ change / (step @ change)) * step
         return lam, unchanged
 
     def _take(self, case: Case, lam: Vector, y: Vector, unchanged: bool, tolerance: float) -> None:
-        """Take λ and y, or a part of the step, and decide whether the case is settled."""
+        """Take λ and y, or a part of the step to them, and decide whether the case is settled."""
         order = self.order
         step, change = lam - case.trial.lam, y - case.trial.y
         slope, curvature = float(step @ case.trial.y), float(step @ change)
-        case.before = None
+        case.last_step = None
         if unchanged and curvature > 0:
             share = float(np.clip(-slope / curvature, *STEP_RANGE))
             case.doubt = max(case.doubt, 4 * EPS * float(abs(case.trial.y).max()))
             lam, y = case.trial.lam + share * step, case.trial.y + share * change
-            case.before = step, change
+            case.last_step = step, change
         missed = float(abs(y[case.C]).max(initial=0.0))
         residual = max(missed, float(-y.min(initial=0.0)))
         case.stalled = case.stalled + 1 if residual > case.residual / 2 else 0
         case.trial, case.sweeps = TrialSolution(lam, y, missed), case.sweeps + 1
         case.residual = residual
-        floor = largest_rounding(self.own, case.load.p[order], lam)
-        right = not wrong_signs(case.C, case.trial, self.own, floor).any()
+        floor = largest_rounding(self.compliance, case.load.p[order], lam)
+        right = not wrong_signs(case.C, case.trial, self.compliance, floor).any()
         enough = TARGET * tolerance
         if case.stalled:
             enough = max(tolerance, ROUNDING_FACTOR * floor)
@@ -264,6 +263,6 @@ class Sweeps:
         case.settled = right and residual <= enough
 
 
-def _nearest(cases: Sequence[Case], load: DualLoadCase) -> Case:
-    """The case with the nearest p."""
-    return min(cases, key=lambda case: float(np.linalg.norm(case.load.p - load.p)))
+def _distance(load: DualLoadCase, case: Case) -> float:
+    """‖p − p'‖₂, mm."""
+    return float(np.linalg.norm(case.load.p - load.p))

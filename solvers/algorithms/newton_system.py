@@ -54,8 +54,8 @@ def conjugate_gradients(
         v += alpha * d
         r -= alpha * Hd
         s = precondition(r)
-        rho, before = float(r @ s), rho
-        d = s + (rho / before) * d
+        rho, last_rho = float(r @ s), rho
+        d = s + (rho / last_rho) * d
     return Solved(v, max_iterations, rho <= target)
 
 
@@ -76,7 +76,7 @@ class NewtonSystem(ABC):
         """v with Hv = b to the tolerance, in at most `limit` inner iterations."""
 
     def take(self, D: Vector) -> None:
-        """Take D ≥ 0, (m,), unless it is the one before."""
+        """Take D ≥ 0, (m,), unless it is unchanged."""
         if not np.array_equal(D, self.D):
             self.factorisations += self.update(D)
             self.D = D

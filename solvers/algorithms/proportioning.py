@@ -83,13 +83,13 @@ class Band(Face):
 
     def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
         order = self.factor.M.order
-        own, gap, compliance = lam[order], y[order], self.diagonal[order]
-        C = np.where(own > 0, compliance * own > gap, gap < 0)
-        start = TrialSolution(own, gap, float(abs(gap[own > 0]).max(initial=0.0)))
-        found = block_pivoting(partial(banded_set, self.factor, start), C, compliance, 0.0, MAX_SETS)
-        self.sets += found.passes
+        force, gap, compliance = lam[order], y[order], self.diagonal[order]
+        C = np.where(force > 0, compliance * force > gap, gap < 0)
+        start = TrialSolution(force, gap, float(abs(gap[force > 0]).max(initial=0.0)))
+        result = block_pivoting(partial(banded_set, self.factor, start), C, compliance, 0.0, MAX_SETS)
+        self.sets += result.passes
         d = np.empty_like(lam)
-        d[order] = np.maximum(found.trial.lam, 0.0) - own
+        d[order] = np.maximum(result.trial.lam, 0.0) - force
         return d
 
 
@@ -97,7 +97,7 @@ class Band(Face):
 class Proportioning:
     """A load case: λ (m,) N and y = Qλ − p (m,) mm.
 
-    gaps : computes y of λ anew. products : with Q. before : the last conjugate direction, Q times it, and its
+    gaps : computes y from λ. products : with Q. last_step : the last conjugate direction, Q times it, and its
     face.
     """
 
@@ -110,11 +110,12 @@ class Proportioning:
     y: Vector
     products: int = 0
     steps: dict[str, int] = field(default_factory=lambda: {"cg": 0, "expansion": 0, "proportioning": 0})
-    before: tuple[Vector, Vector, Mask] | None = None
+    last_step: tuple[Vector, Vector, Mask] | None = None
 
     def solve(self, tolerance: float, max_products: int) -> bool:
-        """Until the KKT residual is at most max(tolerance/10, rounding) mm, or rounding leaves no more; False
-        if the products were not enough. λ and y then are those of the smallest residual computed anew.
+        """Steps until the KKT residual is at most max(tolerance/10, rounding) mm or rounding prevents more.
+
+        False if `max_products` were not enough. λ and y then have the smallest residual that was recomputed.
         """
         best, since, stalled = (np.inf, self.lam, self.y), 0, 0
         while True:
@@ -124,11 +125,11 @@ class Proportioning:
             since += 1
             if moved and since < RECOMPUTED:
                 continue
-            self.y, self.before, since = self.gaps(self.lam), None, 0
+            self.y, self.last_step, since = self.gaps(self.lam), None, 0
             self.products += 1
             residual = kkt_residual(self.lam, self.y)
             stalled = 0 if moved or residual < best[0] / 2 else stalled + 1
-            best = min(best, (residual, self.lam, self.y), key=lambda each: each[0])
+            best = min(best, (residual, self.lam, self.y), key=lambda point: point[0])
             done = residual <= target or stalled == STALLED or (stalled and residual <= tolerance)
             if enough or done:
                 _, self.lam, self.y = best
@@ -141,7 +142,7 @@ class Proportioning:
         if proportional and self._conjugate_gradients(F):
             self.steps["cg"] += 1
             return True
-        self.before = None
+        self.last_step = None
         self.steps["expansion" if proportional else "proportioning"] += 1
         return self._project(self.metric.projection(self.lam, self.y, proportional))
 
@@ -153,8 +154,8 @@ class Proportioning:
     def _conjugate_gradients(self, F: Mask) -> bool:
         """A step on the face; False if it had to end at the boundary."""
         d = -self.metric.precondition(F, self.y)
-        if self.before is not None and not (self.before[2] ^ F).any():
-            last, change, _ = self.before
+        if self.last_step is not None and not (self.last_step[2] ^ F).any():
+            last, change, _ = self.last_step
             d -= (d @ change) / (last @ change) * last
         change = self._times_Q(d)
         slope, curvature = float(self.y @ d), float(d @ change)
@@ -168,7 +169,7 @@ class Proportioning:
         if not inside:
             lam[shrinking[ratios.argmin()]] = 0.0
         self.lam, self.y = lam, self.y + length * change
-        self.before = d, change, F
+        self.last_step = d, change, F
         return inside
 
     def _project(self, d: Vector) -> bool:

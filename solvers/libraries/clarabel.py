@@ -17,7 +17,8 @@ import clarabel
 import numpy as np
 
 from solvers.adapter import Converted, Library, gap_tolerance, rows_for_bounds, upper_triangle
-from solvers.base import Answer, LoadCase, Problem, Status, WarmStart, apply
+from solvers.base import Answer, LoadCase, Problem, Status, WarmStart
+from solvers.options import apply
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",
@@ -56,7 +57,7 @@ class Clarabel(Library):
         if state.problem.bounded:
             settings.equilibrate_enable = False
             settings.static_regularization_constant = 1e-12
-        apply(settings, self.own | self.settings)
+        apply(settings, self.selected | self.settings)
         return settings
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
@@ -69,12 +70,10 @@ class Clarabel(Library):
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
         state, library = ready
         result = library.solve()
-        return state.answer(
+        report = Answer(
             STATUS.get(str(result.status), "failed"),
-            tolerance,
-            np.array(result.x),
-            np.array(result.z),
             iterations=result.iterations,
             reported_s=result.solve_time,  # includes its set-up
             details={"status": str(result.status)},
         )
+        return state.answer(report, np.array(result.x), np.array(result.z), tolerance)

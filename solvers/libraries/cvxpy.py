@@ -9,13 +9,14 @@ is left at CVXPY's defaults, as a user would have it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import cvxpy as cp
 import scipy.sparse as sp
 
 from solvers.adapter import Converted, gap_tolerance
-from solvers.base import FORMS, Answer, Form, LoadCase, Problem, Solver, Status, WarmStart, one_of, require
+from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.options import one_of, require
 
 STATUS: dict[str, Status] = {
     cp.OPTIMAL: "solved",
@@ -42,7 +43,7 @@ class Model:
 class Cvxpy(Solver):
     """via : "OSQP", "CLARABEL", or None for CVXPY's own choice, which is OSQP."""
 
-    forms: ClassVar[tuple[Form, ...]] = FORMS
+    forms = FORMS
 
     def __init__(self, *, via: str | None = None) -> None:
         require("cvxpy", {"via": via}, via=one_of(via, SOLVERS))
@@ -87,15 +88,10 @@ class Cvxpy(Solver):
         try:
             model.problem.unpack_results(raw, model.chain, model.inverse)
         except cp.SolverError as error:
-            return Answer("failed", None, details={"solver": name, "message": str(error)})
+            return Answer("failed", details={"solver": name, "message": str(error)})
         (rows,) = model.problem.constraints
         if model.z.value is None:
-            return Answer("failed", None, details={"solver": name, "status": model.problem.status})
-        return state.answer(
-            STATUS.get(model.problem.status, "failed"),
-            tolerance,
-            model.z.value,
-            rows.dual_value,
-            iterations=model.problem.solver_stats.num_iters,
-            details={"solver": name},
-        )
+            return Answer("failed", details={"solver": name, "status": model.problem.status})
+        status = STATUS.get(model.problem.status, "failed")
+        report = Answer(status, iterations=model.problem.solver_stats.num_iters, details={"solver": name})
+        return state.answer(report, model.z.value, rows.dual_value, tolerance)

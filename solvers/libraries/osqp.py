@@ -53,7 +53,7 @@ class Osqp(Library):
             "verbose": False,
         }
         library = osqp.OSQP()
-        library.setup(state.P, q, state.G, *bounds, **settings | self.own | self.settings)
+        library.setup(state.P, q, state.G, *bounds, **settings | self.selected | self.settings)
         return state, library
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
@@ -73,12 +73,6 @@ class Osqp(Library):
         worst = max(info.prim_res, info.dual_res, abs(info.duality_gap))
         if status == "solved" and worst > tolerance:
             status = "inaccurate"
-        return state.answer(
-            status,
-            tolerance,
-            result.x,
-            result.y,
-            iterations=info.iter,
-            reported_s=info.run_time,
-            details={"status": info.status, "polish": POLISH[info.status_polish]},
-        )
+        details = {"status": info.status, "polish": POLISH[info.status_polish]}
+        report = Answer(status, iterations=info.iter, reported_s=info.run_time, details=details)
+        return state.answer(report, result.x, result.y, tolerance)

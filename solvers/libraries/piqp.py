@@ -11,7 +11,8 @@ import piqp
 import scipy.sparse as sp
 
 from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
-from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart, apply
+from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
+from solvers.options import apply
 
 STATUS: dict[Any, Status] = {
     piqp.PIQP_SOLVED: "solved",
@@ -33,14 +34,14 @@ class Piqp(Library):
 
     def __init__(self, **options: object) -> None:
         super().__init__(**options)
-        if self.own["backend"] == "dense":
-            self.forms = DENSE_FORMS  # type: ignore[misc]  # of this solver alone
+        if self.selected["backend"] == "dense":
+            self.forms = DENSE_FORMS
 
     def defaults(self) -> Any:
         return piqp.DenseSolver().settings
 
     def convert(self, problem: Problem) -> Converted:
-        return converted(problem, self.own["backend"] == "sparse" or is_sparse(problem.blocks))
+        return converted(problem, self.selected["backend"] == "sparse" or is_sparse(problem.blocks))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         library = piqp.SparseSolver() if sp.issparse(state.P) else piqp.DenseSolver()
@@ -48,7 +49,7 @@ class Piqp(Library):
         set_absolute(settings, tolerance, load)
         settings.max_iter = 500
         if is_sparse(state.problem.blocks):
-            settings.kkt_solver = getattr(piqp, self.own["kkt_solver"])
+            settings.kkt_solver = getattr(piqp, self.selected["kkt_solver"])
         apply(settings, self.settings)
         q, h = state.vectors(load)
         limits = {"x_l": np.zeros_like(q)} if h is None else {"G": state.G, "h_u": h}
@@ -66,12 +67,10 @@ class Piqp(Library):
         state, library = ready
         status = library.solve()
         result, info = library.result, library.result.info
-        return state.answer(
+        report = Answer(
             STATUS.get(status, "failed"),
-            tolerance,
-            result.x,
-            result.z_u,
             iterations=info.iter,
             reported_s=info.run_time,
             details={"status": status.name},
         )
+        return state.answer(report, result.x, result.z_u, tolerance)

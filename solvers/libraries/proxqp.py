@@ -11,7 +11,8 @@ import scipy.sparse as sp
 from proxsuite import proxqp
 
 from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
-from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart, apply
+from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
+from solvers.options import apply
 
 BACKENDS = {
     "automatic": proxqp.dense.DenseBackend.Automatic,
@@ -37,8 +38,8 @@ class ProxQp(Library):
 
     def __init__(self, **options: object) -> None:
         super().__init__(**options)
-        if self.own["backend"] != "automatic":
-            self.forms = DENSE_FORMS  # type: ignore[misc]  # of this solver alone
+        if self.selected["backend"] != "automatic":
+            self.forms = DENSE_FORMS
 
     def defaults(self) -> Any:
         return proxqp.dense.QP(1, 0, 0).settings
@@ -52,7 +53,7 @@ class ProxQp(Library):
         if sp.issparse(state.P):
             library = proxqp.sparse.QP(len(q), 0, rows)
         else:
-            backend = BACKENDS[self.own["backend"]]
+            backend = BACKENDS[self.selected["backend"]]
             library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
         settings = library.settings
         set_absolute(settings, tolerance, load)
@@ -86,13 +87,11 @@ class ProxQp(Library):
         state, library, start = ready
         library.solve(*start)
         result, info = library.results, library.results.info
-        return state.answer(
+        report = Answer(
             STATUS.get(info.status, "failed"),
-            tolerance,
-            result.x,
-            result.z,
             iterations=info.iter_ext,
             inner_iterations=info.iter,
             reported_s=info.run_time * 1e-6,  # µs
             details={"status": info.status.name},
         )
+        return state.answer(report, result.x, result.z, tolerance)

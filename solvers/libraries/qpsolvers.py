@@ -17,7 +17,8 @@ from qpsolvers.exceptions import QPError
 
 from problems.errors import InputError
 from solvers.adapter import Converted, dense, gap_tolerance, is_sparse, sorted_csc
-from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, require
+from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
+from solvers.options import NO_OPTIONS, require
 
 #: Options that set the absolute tolerance, and that of the duality gap. Relative tolerances are 0, iteration
 #: limits too large to matter. DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes none
@@ -45,7 +46,6 @@ TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
 }
 
 
-NO_OPTIONS = "this solver takes no options"
 #: Those that overwrite P with its factor.
 OVERWRITE = ("pyqpmad",)
 
@@ -66,7 +66,7 @@ class QpSolvers(Solver):
             require(name, settings, **dict.fromkeys(settings, (False, NO_OPTIONS)))
         self.name, self.settings = name, settings
         if name in qpsolvers.sparse_solvers:
-            self.forms = FORMS  # type: ignore[misc]  # of this solver alone
+            self.forms = FORMS
 
     def convert(self, problem: Problem) -> Converted:
         G = problem.G
@@ -91,19 +91,17 @@ class QpSolvers(Solver):
         try:
             solution = qpsolvers.solve_problem(problem, self.name, **settings | self.settings)
         except QPError as error:
-            return Answer("failed", None, details={**details, "message": str(error)})
+            return Answer("failed", details={**details, "message": str(error)})
         if solution.x is None or (not state.problem.bounded and (solution.z is None or not solution.z.size)):
-            return Answer("failed", None, details=details)
-        facts = solution.extras
-        iterations = facts.get("iterations", facts.get("iter", getattr(facts.get("info"), "iter", None)))
+            return Answer("failed", details=details)
+        extras = solution.extras
+        iterations = extras.get("iterations", extras.get("iter", getattr(extras.get("info"), "iter", None)))
         if isinstance(iterations, np.ndarray):  # quadprog: constraints added, constraints dropped
             iterations = int(iterations.sum())
-        return state.answer(
+        report = Answer(
             "solved" if solution.found else "failed",
-            tolerance,
-            solution.x,
-            solution.z,
             iterations=iterations,
             reported_s=solution.solve_time,
             details=details,
         )
+        return state.answer(report, solution.x, solution.z, tolerance)

@@ -11,7 +11,7 @@ in this space they need a factor of G_CC instead of (n, n) matrices.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
@@ -20,7 +20,7 @@ from scipy.linalg import lapack
 from problems.forms.assembly import Matrix, Vector
 from solvers.algorithms.block_pivoting import solve_from
 from solvers.algorithms.goldfarb_idnani import GiResult, Slacks, goldfarb_idnani
-from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, failed
+from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, failed
 from solvers.kkt import EPS, kkt_residual, kkt_status
 from solvers.method import Method, State
 
@@ -45,7 +45,7 @@ class GoldfarbIdnani(Method):
     block principal pivoting continues from its set (details: finishing_sets).
     """
 
-    forms: ClassVar[tuple[Form, ...]] = DENSE_FORMS
+    forms = DENSE_FORMS
 
     def state(self, problem: Problem) -> _Prepared:
         """G: Q itself, or Q⁻¹ from the Cholesky factor of Q."""

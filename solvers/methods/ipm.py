@@ -25,9 +25,10 @@ from solvers.algorithms.interior_point import (
 )
 from solvers.algorithms.newton_system import NewtonSystem
 from solvers.algorithms.preconditioner import SYSTEMS, OpenLast
-from solvers.base import Answer, DualLoadCase, Problem, Status, one_of, require
+from solvers.base import Answer, DualLoadCase, Problem, Status
 from solvers.kkt import largest_rounding
 from solvers.method import Method, State
+from solvers.options import one_of, require
 
 THETA = 0.995  # fraction of the step to the boundary
 STALLED = 10  # iterations without progress before a restart, or the end

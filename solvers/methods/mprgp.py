@@ -10,15 +10,15 @@ smooth fields only, and the face changes contact by contact.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
-from solvers.base import Answer, Form, LoadCase, Problem, failed, one_of, require
-from solvers.kkt import judged, kkt_residual, largest_rounding, with_x
+from solvers.base import Answer, LoadCase, Problem, failed
+from solvers.kkt import dual_answer, kkt_residual, largest_rounding, with_x
 from solvers.method import Method, State, first_point
+from solvers.options import one_of, require
 
 PRECONDITIONERS = ("band", "face", "none")
 MAX_PRODUCTS = 100_000  # with Q
@@ -49,7 +49,7 @@ class Mprgp(Method):
         projections; "none", diag(Q) in both.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
+    forms = ("dual", "sparse")
 
     preconditioner: str = "band"
 
@@ -83,7 +83,7 @@ class Mprgp(Method):
         enough = case.solve(tolerance, MAX_PRODUCTS)
         residual = kkt_residual(case.lam, case.y)
         solved = residual <= max(tolerance, largest_rounding(ready.diagonal, dual.p, case.lam))
-        answer = judged(
+        answer = dual_answer(
             "solved" if solved else "inaccurate",
             case.lam,
             residual,
@@ -92,4 +92,4 @@ class Mprgp(Method):
             iterations=sum(case.steps.values()),
             inner_iterations=metric.sets,
         )
-        return with_x(prepared, [answer], [load], tolerance)[0] if "x" in ready.problem.needs else answer
+        return with_x(ready.problem, [answer], [load], tolerance)[0]

@@ -11,11 +11,10 @@ all over an area, the equations of each set are solved with a factorisation of K
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
 
 from solvers.algorithms.newton_sweeps import Sweeps
-from solvers.base import Answer, Batch, Form, LoadCase, Problem
+from solvers.base import Answer, Batch, LoadCase, Problem
 from solvers.kkt import with_x
 from solvers.method import Method, State
 
@@ -25,24 +24,24 @@ class _State(State):
     sweeps: Sweeps
 
     def solve(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
-        """One load case, or several together."""
-        prepared, sweeps = self.problem.prepared, self.sweeps
-        dual = prepared.with_p(loads)
-        if len(dual) == 1:
-            answers = [sweeps.answer(sweeps.solved(dual[0], tolerance, self.dual_start), tolerance)]
+        """The answers to one load case, or to several together."""
+        sweeps, cases = self.sweeps, self.problem.prepared.with_p(loads)
+        if len(cases) == 1:
+            answers = [sweeps.answer(sweeps.solved(cases[0], tolerance, self.dual_start), tolerance)]
         else:
-            answers = sweeps(dual, tolerance)
-        return with_x(prepared, answers, loads, tolerance) if "x" in self.problem.needs else answers
+            answers = sweeps(cases, tolerance)
+        answers = [replace(a, details=a.details | {"products": a.iterations}) for a in answers]
+        return with_x(self.problem, answers, loads, tolerance)
 
 
 class ActiveSetNewton(Method):
     """Active-set Newton, from the forces of the fasteners or a warm start; it stops by the rule of `Sweeps`.
 
-    Iterations are products with Q, inner iterations contact sets tried with M. "solved" as said in
-    `Sweeps.answer`; in the sparse form, of the refined x (solvers/kkt.py).
+    Iterations are products with Q, inner iterations contact sets tried with M. `Sweeps.answer` defines
+    "solved"; in the sparse form the refined x decides (solvers/kkt.py).
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
+    forms = ("dual", "sparse")
 
     def state(self, problem: Problem) -> _State:
         return _State(problem=problem, sweeps=Sweeps(problem.prepared))

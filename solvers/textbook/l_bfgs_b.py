@@ -7,12 +7,10 @@ when the objective no longer changes in its last digit, which it also calls a su
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from scipy.optimize import minimize
 
 from problems.forms.assembly import Vector
-from solvers.adapter import answer
+from solvers.adapter import clipped
 from solvers.base import Answer, DualLoadCase, Status
 from solvers.method import Method, State, first_point
 
@@ -22,7 +20,7 @@ LIMIT = 1_000_000  # iterations, and products with Q
 class LBfgsB(Method):
     """It starts from λ = 0 or a warm start. Takes no options."""
 
-    distribution: ClassVar[str | None] = "scipy"
+    distribution = "scipy"
 
     def solved(self, ready: State, load: DualLoadCase, tolerance: float) -> Answer:
         Q, (start, _) = ready.Q.T, first_point(ready.dual_start, load)  # symmetric
@@ -32,7 +30,7 @@ class LBfgsB(Method):
             y = Q @ lam - load.p
             return float(lam @ (y - load.p)) / 2, y
 
-        found = minimize(
+        result = minimize(
             objective,
             start,
             jac=True,
@@ -40,9 +38,9 @@ class LBfgsB(Method):
             bounds=[(0.0, None)] * len(load.p),
             options={"ftol": 0.0, "gtol": tolerance, "maxiter": LIMIT, "maxfun": LIMIT},
         )
-        message = str(found.message)
-        details = {"products": int(found.nfev), "message": message}
-        status: Status = "iteration_limit" if found.status == 1 else "inaccurate"
-        if found.success and "PROJECTED GRADIENT" in message:
+        message = str(result.message)
+        details = {"products": int(result.nfev), "message": message}
+        status: Status = "iteration_limit" if result.status == 1 else "inaccurate"
+        if result.success and "PROJECTED GRADIENT" in message:
             status = "solved"
-        return answer(status, tolerance, found.x, iterations=found.nit, details=details)
+        return clipped(Answer(status, result.x, iterations=result.nit, details=details), tolerance)

@@ -12,7 +12,7 @@ import scipy.linalg as sla
 from scipy.optimize import nnls
 
 from problems.forms.assembly import Matrix
-from solvers.adapter import answer
+from solvers.adapter import clipped
 from solvers.base import Answer, DualLoadCase, Problem
 from solvers.method import Method, State
 
@@ -38,5 +38,5 @@ class Nnls(Method):
         try:
             lam, _ = nnls(ready.U, b, maxiter=LIMIT * len(b))
         except RuntimeError as error:  # too many iterations
-            return Answer("failed", None, details=details | {"message": str(error)})
-        return answer("solved", tolerance, lam, details=details)
+            return Answer("failed", details=details | {"message": str(error)})
+        return clipped(Answer("solved", lam, details=details), tolerance)

@@ -17,9 +17,10 @@ from scipy.linalg import blas
 
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness.dense_block import product
-from solvers.base import Answer, DualLoadCase, require
-from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
+from solvers.base import Answer, DualLoadCase
+from solvers.kkt import dual_answer, kkt_residual, kkt_status, rounding_of
 from solvers.method import Method, State, first_point
+from solvers.options import require
 
 MAX_SWEEPS = 1_000_000
 CHECKED = 10  # sweeps after which y is computed anew
@@ -67,7 +68,7 @@ class ProjectedGaussSeidel(Method):
             y, products = product(Q, lam) - p, products + 1
         status, residual = kkt_status(Q, p, lam, y, tolerance)
         details = {"products": products + sweeps}
-        return judged(status, lam, residual, details, limit, cause, iterations=sweeps)
+        return dual_answer(status, lam, residual, details, limit, cause, iterations=sweeps)
 
 
 def _sweep(Q: Matrix, lam: Vector, y: Vector, relaxation: float) -> Vector:

@@ -16,7 +16,7 @@ import scipy.linalg as sla
 
 from problems.forms.assembly import DualLoadCase
 from solvers.base import Answer
-from solvers.kkt import judged, kkt_status
+from solvers.kkt import dual_answer, kkt_status
 from solvers.method import Method, State
 
 MAX_SETS = 100
@@ -46,4 +46,4 @@ class TextbookActiveSet(Method):
             y = Q @ lam - p
         status, residual = kkt_status(Q, p, lam, y, tolerance)
         limit = f"{MAX_SETS} sets" if wrong.any() else ""
-        return judged(status, lam, residual, {}, limit, iterations=sets)
+        return dual_answer(status, lam, residual, {}, limit, iterations=sets)

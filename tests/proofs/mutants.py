@@ -219,7 +219,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "solvers/algorithms/newton_sweeps.py": {
         "self.A.T @ change.f / self.squares": ("self.A.T @ change.f",),
         "np.clip(-force @ y / (force @ moved or 1.0), 0.0, 1.0)": ("1.0",),
-        "same &= k and not": ("same &= not",),
+        "same and change and not": ("same and not",),
         " and not case.trial.lam[~case.C].any()": ("",),
     },
     "solvers/kkt.py": {

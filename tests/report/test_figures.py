@@ -13,7 +13,7 @@ from problems.ladders import ladders
 from report.figures import style
 from report.figures.junction_maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
 from report.sections.ladders import COUNTED, ladder_map, with_outcomes
-from solvers.registry import modules, owner_of
+from solvers.registry import owner_of, solver_names
 
 NAMED = {"floating", "loads", "parts"}  # ladders whose rungs are words
 #: Vision without one kind of cone, in linear RGB: Machado, Oliveira, Fernandes, IEEE TVCG 15:1291-1298, 2009.
@@ -38,13 +38,21 @@ def lab(colour: str, sight: str) -> np.ndarray:
 
 @pytest.mark.parametrize("sight", SIGHT)
 def test_the_colours_of_our_solvers_are_told_apart(sight: str) -> None:
-    names = [name for name in modules() if owner_of(name) == "ours"]
-    names += ["projected-gauss-seidel", "textbook-active-set"]
-    assert set(names) <= set(style.KNOWN)
-    colours = {name: lab(style.KNOWN[name][0], sight) for name in names}
+    names = [name for name in style.FIXED if owner_of(name) != "library"]
+    colours = {name: lab(style.FIXED[name][0], sight) for name in names}
     near = {pair: np.linalg.norm(colours[pair[0]] - colours[pair[1]]) for pair in combinations(names, 2)}
     assert len(near) >= 21
     assert min(near.values()) > 20, near  # about 2 is just noticeable
+
+
+def test_any_number_of_solvers_look_different_and_keep_their_looks() -> None:
+    assert set(style.FIXED) <= set(solver_names())
+    names = [*solver_names(), *(f"mine-{k}" for k in range(100))]
+    pairs = style.looks(names)
+    assert len(set(pairs.values())) == len(names)
+    assert all(pair not in style.FIXED.values() for pair in (style.looks(["mine-1"])["mine-1"], *style.SPARE))
+    fixed = {name: pairs[name] for name in style.FIXED}
+    assert fixed == style.FIXED
 
 
 def test_every_ladder_of_numbers_says_what_its_rungs_count() -> None:

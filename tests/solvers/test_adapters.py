@@ -15,7 +15,7 @@ from harness.solving.session import SolverSession
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from solvers.adapter import answer, dense, upper_triangle
+from solvers.adapter import clipped, dense, upper_triangle
 from solvers.base import DENSE_FORMS, FORMS, Answer, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
 from solvers.libraries.proxqp import ProxQp
@@ -185,11 +185,11 @@ def test_matrices_in_the_libraries_formats() -> None:
 
 def test_small_negative_multipliers_become_zero_and_what_is_not_finite_is_no_answer() -> None:
     lam = np.array([1.0, -1e-10, -1e-3])
-    got = answer("solved", 1e-9, lam)
+    got = clipped(Answer("solved", lam), 1e-9)
     assert got.lam.tolist() == [1.0, 0.0, -1e-3]
     assert lam[1] == -1e-10  # the library's own array is left alone
-    assert answer("solved", 1e-9, np.array([1.0, np.nan])).status == "failed"
-    assert answer("solved", 1e-9, np.ones(2), np.array([np.inf])).lam is None
+    assert clipped(Answer("solved", np.array([1.0, np.nan])), 1e-9).status == "failed"
+    assert clipped(Answer("solved", np.ones(2), np.array([np.inf])), 1e-9).lam is None
 
 
 def test_almost_solved_is_not_solved() -> None:

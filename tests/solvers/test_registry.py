@@ -1,32 +1,47 @@
 """Solvers by name, their options, and a user's own solver from a file."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from solver_forms import TESTED
 
 from problems.errors import InputError
 from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
 from solvers.registry import make_solver, modules, owner_of, solver_names, solver_version
 
-NAMES = solver_names()
-OURS = ["gi", "ipm", "ipm-fast", "mprgp", "newton"]
-TEXTBOOK = ["l-bfgs-b", "nnls", "projected-gauss-seidel", "textbook-active-set"]
-LIBRARIES = ["clarabel", "cvxpy", "osqp", "piqp", "proxqp"]
+ROOT = Path(__file__).parents[2]
+FOLDERS = {"ours": "methods", "textbook": "textbook", "library": "libraries"}
 
 
 def test_solvers_are_found_by_their_files() -> None:
     """Ours first, the textbook's, the libraries, then what qpsolvers finds."""
-    assert list(modules()) == [*OURS, *TEXTBOOK, *LIBRARIES]
-    assert NAMES[: len(modules())] == list(modules())
-    assert {"quadprog", "daqp", "qpalm"} <= set(NAMES)
-    assert len(NAMES) == len(set(NAMES))
-    assert [name for name in NAMES if owner_of(name) == "ours"] == OURS
-    assert [name for name in NAMES if owner_of(name) == "textbook"] == TEXTBOOK
+    by_owner = {
+        owner: sorted(file.stem.replace("_", "-") for file in (ROOT / "solvers" / folder).glob("[!_]*.py"))
+        for owner, folder in FOLDERS.items()
+    }
+    by_owner["library"].remove("qpsolvers")
+    assert list(modules()) == [name for names in by_owner.values() for name in names]
+    assert {"newton", "nnls", "osqp"} <= set(modules())
+    assert solver_names()[: len(modules())] == list(modules())
+    assert {"quadprog", "daqp", "qpalm"} <= set(solver_names())
+    assert len(solver_names()) == len(set(solver_names()))
+    for owner, names in by_owner.items():
+        assert {owner_of(name) for name in names} == {owner}
 
 
-@pytest.mark.parametrize("name", [*LIBRARIES, "l-bfgs-b", "nnls"])
+def test_the_page_of_solvers_names_each_with_its_forms() -> None:
+    page, forms = (ROOT / "docs/solvers.md").read_text("utf-8"), {}
+    for names, taken in re.findall(r"^\| (`.*?) \|.*\| ([\w, ]+) \|$", page, re.MULTILINE):
+        forms |= {name: set(taken.split(", ")) for name in re.findall(r"`([\w-]+)`", names)}
+    for name in TESTED:
+        assert forms[name] == set(make_solver(name, {}).forms), name
+    assert set(modules()) <= set(forms) <= {*solver_names(), "via", "cvxopt", "kvxopt", "qtqp"}
+
+
+@pytest.mark.parametrize("name", modules())
 def test_versions_are_those_installed(name: str) -> None:
     assert solver_version(name)[0].isdigit()
 

@@ -12,7 +12,7 @@ from solvers.registry import modules
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TEMPLATE = EXAMPLES / "my_solver.py"
 PRINTED = {
-    "fista": 45.282118,
+    "accelerated_gradient": 45.282118,
     "judge_an_answer": 1.820476e-05,
     "own_matrices": 0.914625,
     "scene_in_python": 229.700842,

@@ -61,11 +61,12 @@ def test_judged_by_displacements(suite: str) -> None:
 
 
 def test_no_empty_cell() -> None:
-    found = cells(rows_of("speed"))
+    """A solver that came after the suite was published needs no rows."""
+    measured, suite = cells(rows_of("speed")), read_written(PUBLISHED / "speed" / "suite.toml")
     for scene in {row["scene"] for row in rows_of("speed")}:
-        for name in modules():
+        for name in {entry.name for entry in suite.solver} & set(modules()):
             for form in make_solver(name, {}).forms:
-                assert found[scene, name, form, ""], (scene, name, form)
+                assert measured[scene, name, form, ""], (scene, name, form)
 
 
 def test_loosest_tolerance() -> None:
@@ -161,8 +162,8 @@ def test_settings_are_named() -> None:
     for suite in MEASURED:
         assert all(row["variant"] or not row["options"] for row in rows_of(suite))
     headings = re.findall("^## `(.*)`", (ROOT / "docs/libraries.md").read_text("utf-8"), re.M)
-    libraries = {name for name in modules() if owner_of(name) == "library"}
-    assert libraries | {"daqp", "highs", "qpalm", "quadprog", "scs"} == set(headings)
+    libraries = {row["solver"] for row in rows_of("speed") if row["owner"] == "library"}
+    assert libraries == set(headings)
 
 
 @pytest.mark.parametrize("suite", MEASURED)

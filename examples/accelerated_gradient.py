@@ -8,8 +8,8 @@
 √cond(Q) products with Q, the projected gradient method cond(Q), and stops when max L|z − λ⁺|, a length in mm,
 is at most the tolerance.
 
-As a plug-in:  python -m harness check --plugin examples/fista.py
-               python -m harness run --plugin examples/fista.py --size 4386 --out results/fista
+As a plug-in:  python -m harness check --plugin examples/accelerated_gradient.py
+               python -m harness run --plugin examples/accelerated_gradient.py --size 4386 --out results/fista
 
 Prints the largest contact force, N, in the scene gallery/three-part-stack.
 """
