@@ -14,7 +14,7 @@ from harness.measurement import child_process
 from harness.measurement.worker import measure
 from harness.planning.plan import Measurement
 
-pytestmark = [pytest.mark.slow, pytest.mark.starts]
+pytestmark = pytest.mark.slow
 
 MIB = 300
 
@@ -47,6 +47,7 @@ def outcome(folder: Path, fault: str | None, to: str = "answer.npz", **changes: 
     return row
 
 
+@pytest.mark.starts
 def test_a_worker_that_dies_before_it_has_its_job(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The job cannot be handed over, neither when it is written nor when the pipe is closed."""
     popen = subprocess.Popen

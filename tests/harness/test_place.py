@@ -119,8 +119,7 @@ def no_plan_by_plan(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_plan_by_plan")
-@pytest.mark.parametrize("allowed", [0, 2])
-@pytest.mark.parametrize("limit", [0.03, 0.05])
+@pytest.mark.parametrize(("limit", "allowed"), [(0.03, 0), (0.05, 2)])
 def test_the_fewest_are_the_optimum_or_one_more(
     strip: Path, session: PlanSession, limit: float, allowed: int
 ) -> None:

@@ -44,7 +44,7 @@ from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
 
-pytestmark = [pytest.mark.slow, pytest.mark.starts]
+pytestmark = pytest.mark.slow
 
 CASES = 24
 ROOT = Path(__file__).parents[2]
