@@ -120,8 +120,8 @@ class PartLoadEffect(ElementEffect):
         >>> from problems.model.plate import Plate
         >>> plate = Plate(np.linspace(0, 400, 5), np.linspace(0, 100, 3), 2.0, 70e3, 0.3)
         >>> f = SelfWeight(kind="self_weight", part="skin").load(PartModel(plate, (), range(3)))
-        >>> f.shape, round(sum(f[plate.deflection_dofs(line)].sum() for line in range(3)), 4)  # N
-        ((60,), 2.1182)
+        >>> print(f.shape, f[plate.deflection_dofs(0)].sum().round(4))
+        (60,) 0.5296
         """
 
 
