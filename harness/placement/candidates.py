@@ -63,7 +63,7 @@ class MovableFasteners:
                 raise InputError.one("--candidates", "holes", holes, allowed)
             points, faults = grid(self.bare, rows, columns), []
         else:
-            table = read_columns(Path(holes), {"x": "x", "y": "y"})
+            table = read_columns(Path(holes), ("x", "y"))
             points, faults = np.array(table.rows).reshape(-1, 2), table.faults
         faults = faults + self.faults(points, holes)
         if faults:

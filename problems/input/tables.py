@@ -1,15 +1,15 @@
 """Tables of numbers from any program: CSV files, all read by the same rules.
 
-    separator   what the header has of ; tab and comma, in this order, or what a line sep=; says
-    header      the first line that has the headings; what is above it is skipped, as are empty lines
+    separator   the first of ; tab and comma that the header has, or the one that a line sep=; names
+    header      the first line with the headings; the lines above it and empty lines are skipped
     comments    lines of one cell that begins with # and a blank
-    stray       nothing stands under an empty heading but in the first column, an index
-    unit        mm, unless a heading ends in another one or a row of units follows: converted
-    decimal     one mark a file: that of the first number which can be read in one way only; without such a
+    stray       a cell under an empty heading is refused, but in the first column, which may be an index
+    unit        mm, unless a heading ends in another unit or a row of units follows: converted
+    decimal     one mark per file: that of the first number that can be read in one way only; without such a
                 number the point, if commas separate the cells
     thousands   the other mark, a blank or an apostrophe, if all numbers of the column agree
 
-A number that may be two, 1.250 among ; and nothing else, is refused.
+A number with two readings, such as 1.250 between semicolons, is refused.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from itertools import islice, zip_longest
 from pathlib import Path
 
@@ -35,36 +36,76 @@ NO_UNIT = {"": Fraction(1), "-": Fraction(1)}
 LENGTHS = NO_UNIT | {
     unit: Fraction(mm)
     for names, mm in {
-        "mm millimeter millimetre": "1",
-        "cm": "10",
-        "dm": "100",
-        "m meter metre": "1000",
-        "um \u03bcm micron microns": "0.001",
-        "nm": "0.000001",
-        'in inch inches "': "25.4",
+        "mm": "1",
+        "m": "1000",
+        "um \u03bcm": "0.001",
+        'in inch "': "25.4",
         "ft": "304.8",
-        "mil mils thou": "0.0254",
     }.items()
     for unit in names.split()
 }
-#: Of columns that are no lengths, by name.
+#: The units of columns that are no lengths, by name.
 UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT)
 BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))
 HEADING = re.compile(rf"(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
 PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
-APART = ".,' \u2019\u00a0\u2009\u202f"  # what may part thousands
+APART = ".,' \u2019\u00a0\u2009\u202f"  # separators of thousands
 GROUPS = re.compile(rf"[+-]?[1-9]\d{{0,2}}([{APART}])\d{{3}}(?:\1\d{{3}})*(?:(?!\1)([.,])\d+)?", re.ASCII)
 OTHER = {".": ",", ",": "."}
 STRAY = "no more cells than headings, and none under an empty heading"
 
 
 @dataclass(frozen=True)
+class TableOptions:
+    """How a user's table is read; the same for a file of a scene and for one of the command line.
+
+    columns : the headings, in the order in which the reader names the columns; by default these names.
+    missing : numbers and words that mark a value that is not there.
+    skip_lines : the number of lines above the header, if a heading occurs in one of them.
+    """
+
+    columns: tuple[str, ...] = ()
+    missing: tuple[float | str, ...] = ()
+    skip_lines: int = 0
+
+    def headings(self, names: Sequence[str]) -> dict[str, str]:
+        """The heading of each column by its name. Raises InputError if there are too few."""
+        if self.columns and len(self.columns) < len(names):
+            allowed = f"a heading for each of {', '.join(names)}, separated by commas"
+            raise InputError.one("--columns", "headings", ", ".join(self.columns), allowed)
+        return dict(zip(names, self.columns or names, strict=False))
+
+    def is_missing(self, text: str, value: float) -> bool:
+        """Whether a cell with this text and value is one of the marks, as a word or as a number."""
+        return value in self.numbers or text.lower() in self.words
+
+    @cached_property
+    def words(self) -> list[str]:
+        """The marks of missing values as small letters."""
+        return [str(mark).strip().lower() for mark in self.missing]
+
+    @cached_property
+    def numbers(self) -> list[float]:
+        """The marks of missing values that are numbers."""
+        return [value for word in self.words if not math.isnan(value := number(word, ".")[0])]
+
+
+AS_NAMED = TableOptions()
+
+
+@dataclass(frozen=True)
 class Rows:
-    """The good rows of a file, their line numbers, and the faults."""
+    """The good rows of a file, with their line numbers, and the faults of the others.
+
+    columns : the names of the columns that are there, in the order of the cells of a row.
+    labels : the cell of each row under the heading "name"; empty without such a column.
+    """
 
     path: Path
+    columns: list[str] = field(default_factory=list)
     rows: list[tuple[float, ...]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
 
 
@@ -80,8 +121,9 @@ class Cells:
 
     @classmethod
     def of(cls, path: Path, mib: float, wanted: Iterable[str], skip: int = 0) -> Cells:
-        """Its header is the first line that has these headings, in small letters and without units; if there
-        is none, or nothing is wanted, it is empty. Raises InputError.
+        """Split a file at its header, the first line with the wanted headings, small and without units.
+
+        The header is empty if no line has them, or nothing is wanted. Raises InputError.
         """
         text, wanted = read_text(path, "file", mib).split("\n"), set(wanted)
         skip = min(skip, len(text) - 1)
@@ -95,7 +137,7 @@ class Cells:
         return cls(path, text, said[1] if said else _delimiter(text[first]), [], first + 1 if said else skip)
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
-        """The number of each line that has a cell, and its cells. Raises InputError."""
+        """Yield the number of each line that has a cell, and its cells. Raises InputError."""
         reader = csv.reader(islice(self.text, self.start, None), delimiter=self.delimiter)
         try:
             for cells in reader:
@@ -107,7 +149,7 @@ class Cells:
             raise InputError.one(self.path, "file", str(error), "a readable CSV file") from error
 
     def decimal_mark(self, columns: Sequence[int]) -> str:
-        """That of the numbers in some columns; empty if it cannot be told."""
+        """The decimal mark of the numbers in some columns; empty if no number tells it."""
         for _, cells in self.rows():
             for text in (cells[k] for k in columns if k < len(cells)):
                 plain, groups = PLAIN.fullmatch(text), GROUPS.fullmatch(text)
@@ -118,19 +160,22 @@ class Cells:
 
 
 def read_columns(
-    path: Path,
-    headings: Mapping[str, str],
-    skip_lines: int = 0,
-    missing: Iterable[float | str] = (),
+    path: Path, names: Sequence[str], options: TableOptions = AS_NAMED, optional: Sequence[str] = ()
 ) -> Rows:
-    """The columns of a file, row by row, by name and heading; others are ignored. Bad rows are faults.
+    """Read some columns of a file, row by row; others are ignored. Rows that are no numbers are faults.
 
-    missing : numbers and words in the last column that mark a row without a value; it is left out.
+    optional : the names of columns that need not be there. A row whose last cell is marked as missing is left
+    out.
     """
     read = Rows(path)
     try:
-        table = Cells.of(path, CSV_MIB, [heading(text)[0] for text in headings.values()], skip_lines)
-        _read(table, headings, [str(mark).strip().lower() for mark in missing], read)
+        headings = options.headings(names)
+        wanted = [heading(text)[0] for text in headings.values()]
+        table = Cells.of(path, CSV_MIB, wanted, options.skip_lines)
+        there = [heading(cell)[0] for cell in table.header]
+        headings |= {name: name for name in optional if name in there}
+        read.columns.extend(headings)
+        _read(table, headings, options, read)
     except InputError as error:
         read.faults.extend(error.faults)
     if (more := len(read.faults) - MAX_FAULTS) > 1:
@@ -138,7 +183,7 @@ def read_columns(
     return read
 
 
-def _read(table: Cells, headings: Mapping[str, str], missing: list[str], read: Rows) -> None:
+def _read(table: Cells, headings: Mapping[str, str], options: TableOptions, read: Rows) -> None:
     there, listed = [heading(cell) for cell in table.header], ", ".join(headings.values())
     names = [name for name, _ in there]
     wanted = [heading(text)[0] for text in headings.values()]
@@ -147,9 +192,9 @@ def _read(table: Cells, headings: Mapping[str, str], missing: list[str], read: R
         allowed = f"a header line with the columns {listed}, once each"
         raise InputError.one(table.path, f"line {line}", table.text[line - 1], allowed)
     columns = [names.index(name) for name in wanted]
+    label = names.index("name") if "name" in names else None
     scales = [UNITS.get(name, LENGTHS) for name in headings]
-    mark, marks = table.decimal_mark(columns), {number(word, ".")[0] for word in missing}
-    marks.discard(math.nan)
+    mark = table.decimal_mark(columns)
     units, seen, below = [there[k][1] for k in columns], [""] * len(columns), True
     for line, cells in table.rows():
         texts = [cells[k] if k < len(cells) else "" for k in columns]
@@ -164,7 +209,7 @@ def _read(table: Cells, headings: Mapping[str, str], missing: list[str], read: R
                 raise InputError.one(table.path, f"line {table.start}, unit", unit, allowed)
         below = False
         numbers = [number(text, mark) for text in texts]
-        if texts[-1].lower() in missing or numbers[-1][0] in marks:
+        if options.is_missing(texts[-1], numbers[-1][0]):
             continue
         fault = ""
         if is_stray(names, cells):
@@ -183,26 +228,22 @@ def _read(table: Cells, headings: Mapping[str, str], missing: list[str], read: R
         scaled = zip(numbers, factors, strict=True)
         read.rows.append(tuple(value * by.numerator / by.denominator for (value, _), by in scaled))
         read.lines.append(line)
+        if label is not None:
+            read.labels.append(cells[label])
     if not read.rows and not read.faults:
         read.faults.append(Fault(str(table.path), "rows", 0, "at least one row below the header"))
 
 
 def is_stray(names: Sequence[str], cells: Sequence[str]) -> bool:
-    """Whether a cell stands under no heading: 0,5 would be two cells. The first column may be an index."""
+    """Whether a cell stands under no heading, as the 5 of 0,5 does. The first column may be an index."""
     return any(cell and not name for name, cell in list(zip_longest(names, cells, fillvalue=""))[1:])
 
 
-def headings(path: Path, wanted: Iterable[str] = ("id", "x", "y", "z")) -> list[str]:
-    """The headings of a file beside those that are wanted; none if it cannot be read."""
-    try:
-        return [heading(cell)[0] for cell in Cells.of(path, CSV_MIB, wanted).header]
-    except InputError:
-        return []
-
-
 def number(text: str, mark: str) -> tuple[float, str]:
-    """Its value, NaN if it is no number; and what parts its thousands, "none" if nothing does, or "" where it
-    has none. mark : of decimals, empty if it is not known.
+    """The value of a text, NaN if it is no number, and the separator of its thousands.
+
+    mark : the decimal mark, empty if it is not known. The separator is "none" for a number of 1000 or more
+    without one, and "" for a smaller number.
     """
     plain, groups = PLAIN.fullmatch(text), GROUPS.fullmatch(text)
     if plain and (plain[1] or plain[2] or mark) == mark:
@@ -214,7 +255,7 @@ def number(text: str, mark: str) -> tuple[float, str]:
 
 
 def doubt(texts: Iterable[str], mark: str) -> str:
-    """What to write in place of the first of these that may be two numbers, or has another decimal mark."""
+    """What to write instead of the first text with two readings or another decimal mark; "" if none has."""
     for text in texts:
         plain, groups = PLAIN.fullmatch(text), GROUPS.fullmatch(text)
         if not math.isnan(number(text, mark)[0]):

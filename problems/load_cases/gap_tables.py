@@ -16,7 +16,7 @@ import numpy as np
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
-from problems.input.tables import LENGTHS, Cells, doubt, heading, number
+from problems.input.tables import AS_NAMED, LENGTHS, Cells, TableOptions, doubt, heading, number
 
 COUNTS = {"", "case", "name", "index", "row", "no", "no.", "nr", "nr.", "id", "unnamed: 0"}
 PLAUSIBLE = 5  # mm: gaps before riveting are smaller
@@ -25,8 +25,8 @@ NOTHING = re.compile(r"#\D.*|n/?a|nan|null|-*", re.IGNORECASE)  # where a gap is
 QUICK = re.compile(r"[-+.\deE]+", re.ASCII)
 
 
-def read_gaps(path: Path, m: int, mib: float) -> Matrix:
-    """(rows, columns) mm, NaN where a cell is no number. Raises InputError."""
+def read_gaps(path: Path, m: int, mib: float, options: TableOptions = AS_NAMED) -> Matrix:
+    """(rows, columns) mm, NaN where a gap is missing. Raises InputError."""
     table = Cells.of(path, mib, ())
     rows = table.rows()
     first = list(islice(rows, FIRST))
@@ -35,7 +35,7 @@ def read_gaps(path: Path, m: int, mib: float) -> Matrix:
     mark, values = table.decimal_mark(range(2 * m + 2)), []
     for line, row in chain(first, rows):
         cells = _trimmed(row, m)
-        values.append(_numbers(path, line, cells, mark, m))
+        values.append(_numbers(path, line, cells, mark, m, options))
         if len(cells) < len(names) or len(cells) != len(values[0]):
             allowed = f"{max(len(values[0]), len(names))} cells, as in the first row"
             raise InputError.one(path, f"line {line}, cells", len(cells), allowed)
@@ -101,16 +101,17 @@ def _unit(path: Path, names: list[str]) -> str:
     return units[0] if units else ""
 
 
-def _numbers(path: Path, line: int, cells: list[str], mark: str, m: int) -> Vector:
-    """The numbers of a row. Raises InputError if one of the last m is none."""
-    if mark == "." and QUICK.fullmatch("".join(cells)):
+def _numbers(path: Path, line: int, cells: list[str], mark: str, m: int, options: TableOptions) -> Vector:
+    """The numbers of a row, NaN where one is missing. Raises InputError if one of the last m is none."""
+    if mark == "." and not options.missing and QUICK.fullmatch("".join(cells)):
         try:
             return np.array(list(map(float, cells)))
         except ValueError:
             pass
     values = np.array([number(cell, mark)[0] for cell in cells])
-    wrong = doubt(cells, mark)
-    if wrong or np.isnan(values[-m:]).any():
+    lost = np.array([*map(options.is_missing, cells, values)])
+    wrong = doubt((cell for cell, is_lost in zip(cells, lost, strict=True) if not is_lost), mark)
+    if wrong or (np.isnan(values) & ~lost)[-m:].any():
         allowed = wrong or "a finite number in each cell"
         raise InputError.one(path, f"line {line}", ", ".join(cells)[:80], allowed)
-    return values
+    return np.where(lost, np.nan, values)

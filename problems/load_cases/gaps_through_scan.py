@@ -22,19 +22,19 @@ from problems.effects.initial_gap import square_root
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.input.scan_points import crowded, too_small, unlike
-from problems.input.tables import read_columns
+from problems.input.tables import AS_NAMED, TableOptions, read_columns
 from problems.model.interface import AnyJoint, on_junction
 
 NOISE = 1e-3  # ν
 MOST = 5000  # points of a scan: WCWᵀ is dense
 
 
-def read_scan(path: Path, joint: AnyJoint) -> tuple[Matrix, list[str]]:
+def read_scan(path: Path, joint: AnyJoint, options: TableOptions = AS_NAMED) -> tuple[Matrix, list[str]]:
     """(s, 3) x, y and gap in mm, by x and y; and sentences on what is unusual.
 
     Raises InputError with all faults, also of points off the junction or at one place.
     """
-    read = read_columns(path, {name: name for name in ("x", "y", "gap")})
+    read = read_columns(path, ("x", "y", "gap"), options)
     if len(read.rows) > MOST:
         raise InputError.one(path, "points", len(read.rows), f"at most {MOST}: thin the scan out")
     points, lines = np.array(read.rows).reshape(-1, 3), read.lines

@@ -15,7 +15,9 @@ from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import damage
 from problems.input.scan_points import neighbours, outliers
+from problems.input.tables import AS_NAMED, TableOptions
 from problems.model.effect import GapEffect
+from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
@@ -61,30 +63,57 @@ class MeasuredGaps(LoadCases):
         return self.gaps[self.numbers.index(k) if self.numbers else k]
 
 
-def measured_gaps(scene: Scene, path: Path, count: int | None = None, form: Form = "dual") -> MeasuredGaps:
+def measured_gaps(
+    scene: Scene,
+    path: Path,
+    count: int | None = None,
+    form: Form = "dual",
+    options: TableOptions = AS_NAMED,
+) -> MeasuredGaps:
     """The first `count` rows, or all, of a .csv (numbers; # begins a comment), .npz or .npy.
 
     An .npz must hold an array `gaps`, or a single array; an .npy is memory-mapped, the others are read into
-    memory. A .csv (or .csv.gz) may have a header and a column that counts its rows: see gap_tables.py. Raises
-    InputError naming the cases with faults.
+    memory. A .csv (or .csv.gz) may have a header and a column that counts its rows: see gap_tables.py. A gap
+    that `options` marks as missing becomes that of the nearest contact of its pair. Raises InputError naming
+    the cases with faults.
     """
     effects = scene.effects if isinstance(scene, JointScene) else ()
     forces = load_case(scene, form, [each for each in effects if not isinstance(each, GapEffect)])
     m = len(forces.g)
-    gaps = _read(regular_file(path, "file", TABLE_MIB), m)
+    gaps = _read(regular_file(path, "file", TABLE_MIB), m, options)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
         raise InputError.one(
             path, "shape", gaps.shape, f"one row per case, one column for each of {m} contacts"
         )
     if count is not None and count > len(gaps):
         raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
+    notes = []
+    if options.missing and isinstance(scene, JointScene):
+        gaps, lost = _completed(scene.joint, np.where(np.isin(gaps, options.numbers), np.nan, gaps))
+        notes = [f"{path}: {lost} missing gaps are taken from the nearest contact of their case"] * bool(lost)
     faults = list(_faults(path, gaps))
     if faults:
         more = len(faults) - MAX_FAULTS
         rest = [Fault(str(path), "cases", f"{more} more", ALLOWED)] if more > 0 else []
         raise InputError(faults[:MAX_FAULTS] + rest)
-    notes = tuple(_unusual(scene, path, gaps[:count]))
-    return MeasuredGaps(forces, gaps, len(gaps) if count is None else count, notes=notes)
+    notes += _unusual(scene, path, gaps[:count])
+    return MeasuredGaps(forces, gaps, len(gaps) if count is None else count, notes=tuple(notes))
+
+
+def _completed(joint: AnyJoint, gaps: Matrix) -> tuple[Matrix, int]:
+    """The gaps (rows, m), each NaN replaced by the gap of the nearest contact of its pair, and their number.
+
+    A case with no gap of a pair keeps its NaN.
+    """
+    from scipy.spatial import cKDTree
+
+    lost = np.isnan(gaps)
+    for pair in joint.pairs:
+        span, places = joint.span(pair), joint.places(pair)
+        for case, gone in zip(gaps[:, span], lost[:, span], strict=True):
+            if gone.any() and not gone.all():
+                case[gone] = case[~gone][cKDTree(places[~gone]).query(places[gone])[1]]
+    return gaps, int(lost.sum())
 
 
 def _unusual(scene: Scene, path: Path, gaps: Matrix) -> Iterator[str]:
@@ -114,12 +143,12 @@ def _faults(path: Path, gaps: Matrix) -> Iterator[Fault]:
             yield Fault(str(path), f"case {start + row}, contact {contacts[0]}{others}", value, ALLOWED)
 
 
-def _read(path: Path, m: int) -> Matrix:
+def _read(path: Path, m: int, options: TableOptions) -> Matrix:
     suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     try:
         match suffix:
             case ".csv":
-                return read_gaps(path, m, TABLE_MIB)
+                return read_gaps(path, m, TABLE_MIB, options)
             case ".npy":
                 return _real(np.load(path, mmap_mode="r"))
             case ".npz":

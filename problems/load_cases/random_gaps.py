@@ -14,6 +14,7 @@ from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix
 from problems.input.bounded_types import validation_faults
+from problems.input.tables import AS_NAMED, TableOptions
 from problems.model.interface import AnyJoint
 from problems.model.junction_terms import at_contacts
 from problems.model.scene import JointScene, Scene
@@ -80,11 +81,13 @@ def random_gaps(
     correlation_length: float | None = None,
     form: Form = "dual",
     around: Path | str | None = None,
+    options: TableOptions = AS_NAMED,
 ) -> RandomGaps:
     """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) override its values.
     Around a measured gap the mean is 0 by default.
     around : a CSV of a scan, with columns x, y and gap in mm, that the gaps pass through (scan.py); its mean
         is theirs by default.
+    options : how that CSV is read.
     form : what will be solved; f has an entry per unknown of its K.
 
     Raises InputError if one of them is given by neither, or if the scene has no joint or more than one
@@ -98,8 +101,8 @@ def random_gaps(
     if len(found) > 1:
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
-    options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    points, notes = (None, []) if around is None else read_scan(Path(around), scene.joint)
+    law = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
+    points, notes = (None, []) if around is None else read_scan(Path(around), scene.joint, options)
     usual = None if points is None else float(points[:, 2].mean())
     if any(effect.kind == "measured_gap" for effect in scene.effects):
         if around is not None:
@@ -107,8 +110,8 @@ def random_gaps(
             raise InputError.one(where, "measured_gap", "an effect of the scene", allowed)
         usual = 0.0
     own = {"mean": table.get("mean", usual)} | (table.get("random") or {})
-    given = own | {key: value for key, value in options.items() if value is not None}
-    if missing := [key for key in options if given.get(key) is None]:
+    given = own | {key: value for key, value in law.items() if value is not None}
+    if missing := [key for key in law if given.get(key) is None]:
         allowed = "is not in the scene: give --{}, in mm"
         raise InputError([Fault(where, key, None, allowed.format(key.replace("_", "-"))) for key in missing])
     random = {"sd": given["sd"], "correlation_length": given["correlation_length"], "seed": 0}

@@ -15,13 +15,14 @@ from pydantic import ValidationError
 
 from problems.errors import Fault
 from problems.input.bounded_types import unknown, validation_faults
-from problems.input.tables import Rows, read_columns
+from problems.input.tables import Rows, TableOptions, read_columns
 
 from .effect import Effect, unknown_part
 from .interface import AnyJoint
 from .joint import Faults
 
-FILE_KEYS = ("file", "columns", "skip_lines", "missing")
+#: The keys that say how the CSV of the key `file` is read, and their defaults.
+FILE_KEYS: dict[str, Any] = {"columns": {}, "skip_lines": 0, "missing": []}
 #: Effects that a user may look for, and the assumption of the model that excludes each.
 EXCLUDED = {
     "friction": "assumption 4: friction between the parts is neglected",
@@ -62,30 +63,15 @@ class EffectTable:
             return
         effect, content = effect_class(kind), self.content
         if effect.columns and "file" in content:
-            if "points" in content:
-                yield Fault(
-                    str(self.where), f"{self._name}.file", content["file"], "give either points or file"
-                )
+            if wrong := list(self._located(self._wrong_keys(effect))):
+                yield from wrong
                 return
-            headings = content.get("columns", {})
-            named = isinstance(headings, dict) and all(isinstance(value, str) for value in headings.values())
-            if not (named and set(headings) <= set(effect.columns)):
-                allowed = f"headings of the file by name, as {{ {effect.columns[0]} = 'X [mm]' }}; names: "
-                allowed += ", ".join(effect.columns)
-                yield Fault(str(self.where), f"{self._name}.columns", headings, allowed)
-                return
-            skip, missing = content.get("skip_lines", 0), content.get("missing", [])
-            if type(skip) is not int or skip < 0:
-                yield Fault(str(self.where), f"{self._name}.skip_lines", skip, "a number of lines, 0 or more")
-                return
-            if not isinstance(missing, list) or (missing and "gap" not in effect.columns):
-                allowed = "of a measured_gap, a list of what marks a point without a gap, as [9999, 'NaN']"
-                yield Fault(str(self.where), f"{self._name}.missing", missing, allowed)
-                return
-            path = self.where.parent / str(content["file"])
-            columns = {name: headings.get(name, name) for name in effect.columns}
-            self.rows = read_columns(path, columns, skip_lines=skip, missing=missing)
-            content = {key: value for key, value in content.items() if key not in FILE_KEYS}
+            names, skip, missing = (content.get(key, value) for key, value in FILE_KEYS.items())
+            options = TableOptions(
+                tuple(names.get(name, name) for name in effect.columns), tuple(missing), skip
+            )
+            self.rows = read_columns(self.where.parent / str(content["file"]), effect.columns, options)
+            content = {key: value for key, value in content.items() if key not in (*FILE_KEYS, "file")}
             content["points"] = self.rows.rows
         try:
             self.effect = effect.model_validate(content)
@@ -101,24 +87,39 @@ class EffectTable:
                     yield fault
         yield from self.rows.faults if self.rows else ()
 
+    def _wrong_keys(self, effect: type[Effect]) -> Faults:
+        """Yield the keys that say wrongly how the file is read."""
+        names, skip, missing = (self.content.get(key, value) for key, value in FILE_KEYS.items())
+        if "points" in self.content:
+            yield "file", self.content["file"], "give either points or file"
+        are_headings = isinstance(names, dict) and all(isinstance(value, str) for value in names.values())
+        if not (are_headings and set(names) <= set(effect.columns)):
+            allowed = f"headings of the file by name, as {{ {effect.columns[0]} = 'X [mm]' }}; names: "
+            yield "columns", names, allowed + ", ".join(effect.columns)
+        if type(skip) is not int or skip < 0:
+            yield "skip_lines", skip, "a number of lines, 0 or more"
+        if not isinstance(missing, list) or (missing and "gap" not in effect.columns):
+            allowed = "of a measured_gap, a list of what marks a point without a gap, as [9999, 'NaN']"
+            yield "missing", missing, allowed
+
     def misfits(self, joint: AnyJoint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
-        """The faults with respect to the joint and to the effects of the other tables."""
-        found: Faults = iter(())
+        """Yield the faults with respect to the joint and to the effects of the other tables."""
+        faults: Faults = iter(())
         if self.effect is not None:
             others = [table.effect for table in tables if table.effect is not None and table is not self]
-            found = self.effect.faults(joint, others)
+            faults = self.effect.faults(joint, others)
         elif isinstance(part := self.content.get("part"), str):
-            found = unknown_part(part, joint)
-        yield from self._faults(found)
+            faults = unknown_part(part, joint)
+        yield from self._located(faults)
 
     @property
     def _name(self) -> str:
         kind = self.content.get("kind")
         return f"effect[{self.index}]" + (f" ({kind})" if kind else "")
 
-    def _faults(self, found: Faults) -> Iterator[Fault]:
-        """The faults of parameters; those of a file's rows are located by line."""
-        for key, value, allowed in found:
+    def _located(self, faults: Faults) -> Iterator[Fault]:
+        """Yield faults of keys with the place of each: the scene, or the line of a file's row."""
+        for key, value, allowed in faults:
             row = re.fullmatch(r"points\[(\d+)\]", key)
             if self.rows and row:
                 yield Fault(str(self.rows.path), f"line {self.rows.lines[int(row[1])]}", value, allowed)

@@ -12,13 +12,13 @@ from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
 from problems.input.scan_points import crowded, unlike
-from problems.input.tables import read_columns
+from problems.input.tables import TableOptions, read_columns
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.sweep import sweep
 from problems.model.effect_tables import EffectTable
 
-COLUMNS = {name: name for name in ("x", "y", "gap")}
+COLUMNS = ("x", "y", "gap")
 POINTS = [(0.0, 0.0, 0.1), (2000.0, 0.0, 0.9), (1250.0, 300.0, 0.5)]
 READ = {
     "points part thousands": "x;y;gap\n0;0;0,100\n2.000;0;0,900\n1.250;300;0,500\n",
@@ -28,7 +28,7 @@ READ = {
     "index": ",x,y,gap\n0,0,0,0.1\n1,2000,0,0.9\n2,1250,300,0.5\n",
     "comments and a preamble": "Scan 7, part: B\n\n#x,y,gap\n#\n0,0,0.1\n# more\n2000,0,0.9\n1250,300,0.5\n",
     "micrometres": "x (m);y in mm;Gap [\u00b5m]\n0;0;100\n2;0;900\n1,25;300;500\n",
-    "Greek mu": "x [cm],y/mm,gap_\u03bcm\n0,0,100\n200,0,900\n125,300,500\n",
+    "Greek mu": "x [m],y/mm,gap_\u03bcm\n0,0,100\n2,0,900\n1.25,300,500\n",
     "a row of units": "x,y,gap\nm,mm,um\n0,0,100\n2,0,900\n1.25,300,500\n",
     "missing": "x,y,gap\n0,0,0.1\n5,5,9999\n2000,0,0.9\n6,6,NaN\n1250,300,0.5\n7,7,\n8,8,-1\n",
     "names that begin with #": "name,x,y,gap\n#1,0,0,.1\n#2,2000,0,.9\n# 3,1250,300,.5\n",
@@ -41,7 +41,7 @@ BLANKS = READ["blanks and apostrophes"].replace("1\u202f250", "1'250")
 def test_the_same_points(name: str, tmp_path: Path) -> None:
     text = READ[name].replace("1\u202f250", "1 250")
     (tmp_path / "t.csv").write_bytes(gzip.compress(text.encode()))
-    read = read_columns(tmp_path / "t.csv", COLUMNS, missing=[9999, "nan", "", -1.0])
+    read = read_columns(tmp_path / "t.csv", COLUMNS, TableOptions(missing=(9999, "nan", "", -1.0)))
     assert (read.faults, read.rows) == ([], POINTS)
 
 
@@ -239,6 +239,22 @@ def test_what_is_said_of_cases_around_a_scan_and_of_a_sweep(tmp_path: Path) -> N
     gap = InitialGap(kind="initial_gap", mean=0.5)
     assert "two values, 0,1" in sweep(make_scene(JOINT, gap), ["initial_gap.mean=0,1"]).notes[0]
     assert sweep(make_scene(JOINT, gap), ["initial_gap.mean=0.1,1"]).notes == ()
+
+
+def test_missing_marks_and_headings_hold_for_a_scan_and_for_gaps(tmp_path: Path) -> None:
+    """A scan without two of its points; a missing gap is that of the nearest contact."""
+    options = TableOptions(("Pos X", "Pos Y", "Spalt"), ("9999", "n/a"))
+    (tmp_path / "scan.csv").write_text("Pos X,Pos Y,Spalt\n0,0,.1\n9,9,9999\n200,60,.5\n9,9,n/a\n")
+    law = {"sd": 0.1, "correlation_length": 90.0, "around": tmp_path / "scan.csv"}
+    assert random_gaps(SCENE, 1, 0, **law, options=options).points.tolist() == [[0, 0, 0.1], [200, 60, 0.5]]
+    with pytest.raises(InputError, match="--columns: headings = 'X, Y': a heading for each of x, y, gap"):
+        random_gaps(SCENE, 1, 0, **law, options=TableOptions(("X", "Y")))
+    row = [f"0.{k}" for k in range(1, 10)]
+    for mark in options.missing:
+        (tmp_path / "g.csv").write_text(",".join([*row[:8], mark]) + "\n")
+        cases = measured_gaps(SCENE, tmp_path / "g.csv", options=options)
+        assert cases.gaps.tolist() == [[*map(float, row[:8]), 0.6]]
+        assert "1 missing gaps" in cases.notes[0]
 
 
 def test_lines_above_a_table_are_skipped(tmp_path: Path) -> None:
