@@ -16,6 +16,8 @@ from harness.terminal import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from problems.input.tables import TableOptions
+
 NOTHING_WRITTEN = ("", "Interrupted: nothing was written.")
 WIDTH_OF_A_LOG = 160
 MOST_FAULTS = 100  # shown at once
@@ -24,6 +26,14 @@ LONGEST_LINE = 200  # characters of a file quoted in a message
 
 def option(metavar: str, help: str, **limits: Any) -> Any:
     return typer.Option(metavar=metavar, help=help, **limits)
+
+
+def table_options(columns: str | None, missing: list[str] | None) -> TableOptions:
+    """How --around, --gaps and --candidates are read, by --columns and --missing."""
+    from problems.input.tables import TableOptions
+
+    headings = [heading.strip() for heading in columns.split(",")] if columns else []
+    return TableOptions(tuple(headings), tuple(missing or ()))
 
 
 class FormName(StrEnum):
@@ -61,6 +71,11 @@ Gaps = Annotated[
     Path | None,
     option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
 ]
+Columns = Annotated[
+    str | None,
+    option("HEADINGS", "Headings of x, y and gap in FILE, as 'Pos X,Pos Y,Gap'.  [default: x,y,gap]"),
+]
+Missing = Annotated[list[str] | None, option("MARK", "Mark of a missing gap in FILE, as 9999. Repeatable.")]
 Scheduler = Annotated[
     str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
 ]

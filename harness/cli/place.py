@@ -17,7 +17,10 @@ def place(
     out: Annotated[Path, option("DIR", "Output directory.")],
     candidates: Annotated[
         str | None,
-        option("HOLES", "Rows x columns, as 4x32, or a CSV with x and y in mm.  [default: the scene's own]"),
+        option(
+            "HOLES",
+            "Rows x columns, as 4x32, or a CSV with x, y in mm, perhaps name.  [default: the scene's own]",
+        ),
     ] = None,
     allow_gap: Annotated[
         float | None, option("MM", "Find the fewest fasteners that leave no larger gap.", min=0.0)
@@ -34,6 +37,8 @@ def place(
     correlation_length: options.Length = None,
     around: options.Around = None,
     gaps: options.Gaps = None,
+    columns: options.Columns = None,
+    missing: options.Missing = None,
     scheduler: options.Scheduler = None,
 ) -> None:
     """Find the fewest fasteners that keep a gap in most load cases, or the best N, and their order.
@@ -62,6 +67,7 @@ def place(
         from harness.terminal.console import ConsoleReporter
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        read_by = options.table_options(columns, missing)
         placement = place_fasteners(
             scene,
             out,
@@ -69,7 +75,7 @@ def place(
             allow_gap_mm=allow_gap,
             count=count,
             share=share,
-            cases=GapCases(cases, seed, mean, sd, correlation_length, around, gaps),
+            cases=GapCases(cases, seed, mean, sd, correlation_length, around, gaps, read_by),
             scheduler=scheduler,
             reporter=ConsoleReporter(console, plain=True),
         )

@@ -12,11 +12,13 @@ from .options import (
     AllowGap,
     Around,
     Cases,
+    Columns,
     FormName,
     Gaps,
     Length,
     Mean,
     MemoryLimit,
+    Missing,
     Plugin,
     SceneName,
     Scheduler,
@@ -24,6 +26,7 @@ from .options import (
     Spread,
     error_reporting,
     option,
+    table_options,
 )
 
 
@@ -37,6 +40,8 @@ def series(
     correlation_length: Length = None,
     around: Around = None,
     gaps: Gaps = None,
+    columns: Columns = None,
+    missing: Missing = None,
     sweep: Annotated[
         list[str] | None,
         option("KEY=VALUES", "A key of the scene and its values. Repeatable, for all combinations."),
@@ -96,12 +101,13 @@ def series(
         from harness.terminal.console import ConsoleReporter, show_verdict
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        read_by = table_options(columns, missing)
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         taken: Any = form.value if form else None
         outcome = solve_into(
             scene,
             out,
-            GapCases(cases, seed, mean, sd, correlation_length, around, gaps),
+            GapCases(cases, seed, mean, sd, correlation_length, around, gaps, read_by),
             SeriesOptions(solver, taken, *accuracy, threads, plugin, *limits),
             sweep=sweep or (),
             allow_gap_mm=allow_gap,

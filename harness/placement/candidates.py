@@ -12,7 +12,7 @@ from problems.effects.fasteners import Fasteners
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix
 from problems.input.scan_points import crowded
-from problems.input.tables import read_columns
+from problems.input.tables import AS_NAMED, TableOptions, read_columns
 from problems.model.effect import SpringEffect
 from problems.model.interface import on_junction
 from problems.model.positions import MOST
@@ -20,6 +20,7 @@ from problems.model.scene import JointScene, Scene
 
 Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
+Names = dict[Place, str]
 
 ROWS_AND_COLUMNS = re.compile(r"(\d{0,9})x(\d{0,9})")
 ROWS = range(1, 5)  # of uniform plans
@@ -47,28 +48,29 @@ class MovableFasteners:
             raise InputError(twice)
         return cls(replace(scene, effects=others), fasteners[0], plan_of(marks))
 
-    def candidates(self, holes: str | None) -> Plan:
-        """The holes that fasteners may go into.
+    def candidates(self, holes: str | None, options: TableOptions = AS_NAMED) -> tuple[Plan, Names]:
+        """The holes that fasteners may go into, and their names if the CSV has a column `name`.
 
         holes : a pattern `4x32`, rows × columns of equal cells of the junction, or the path of a CSV with
-        columns x and y, mm; None: where the scene's fasteners are. Raises InputError if a hole is off the
-        parts, or there twice.
+        columns x and y, mm, read by `options`; None: where the scene's fasteners are. Raises InputError if a
+        hole is off the parts, or there twice.
         """
         if holes is None:
-            return self.current
+            return self.current, {}
         if pattern := ROWS_AND_COLUMNS.fullmatch(holes):
             rows, columns = (int(number or 0) for number in pattern.groups())
             if not 0 < rows * columns <= MOST:
                 allowed = f"rows x columns, 1 to {MOST} holes, or a CSV file"
                 raise InputError.one("--candidates", "holes", holes, allowed)
-            points, faults = grid(self.bare, rows, columns), []
+            points, faults, labels = grid(self.bare, rows, columns), [], []
         else:
-            table = read_columns(Path(holes), ("x", "y"))
-            points, faults = np.array(table.rows).reshape(-1, 2), table.faults
+            table = read_columns(Path(holes), ("x", "y"), options)
+            points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.labels
         faults = faults + self.faults(points, holes)
         if faults:
             raise InputError(faults)
-        return plan_of(points)
+        places = map(tuple, points.round(DIGITS).tolist())
+        return plan_of(points), dict(zip(places, labels, strict=False))
 
     def faults(self, points: Matrix, source: str) -> list[Fault]:
         """One fault for each point off the parts, there twice, or where a fastener is installed."""

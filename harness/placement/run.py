@@ -38,6 +38,7 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
+from problems.input.tables import AS_NAMED
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
@@ -99,8 +100,8 @@ def place(
         Directory for the plan (plan.toml, plan.csv), the report and the answers so far: the same call
         continues an interrupted search.
     candidates : str or Path, optional
-        The holes: rows x columns, as "4x32", or a CSV with columns x and y, mm; by default the places of the
-        scene's fasteners.
+        The holes: rows x columns, as "4x32", or a CSV with columns x and y, mm, and perhaps name, which
+        plan.csv keeps; by default the places of the scene's fasteners.
     allow_gap_mm : float, optional
         The largest gap allowed, mm.
     count : int, optional
@@ -136,8 +137,9 @@ def place(
     inputs = [Path(file) for file in (scene, candidates, cases.around, cases.gaps) if file]
     refuse_inputs([directory / name for name in OUTPUTS], inputs)
     movable = MovableFasteners.of(read_scene(source))
-    holes = movable.candidates(None if candidates is None else str(candidates))
-    single = cases == DEFAULT and not any(gap.random for gap in movable.bare.effects_of(InitialGap))
+    holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
+    random = [gap for gap in movable.bare.effects_of(InitialGap) if gap.random]
+    single = replace(cases, options=AS_NAMED) == DEFAULT and not random
     faults = cases.faults()
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
@@ -181,18 +183,23 @@ def place(
             journal = AnswerJournal(study, directory / PLANS, identity, executor)
             search = Search(journal, study.bare, nodes, holes, 0, 0, goal.limit_mm or 0.0, reporter)
             result = search_in_rounds(search, movable.current, goal, order)
+        from report.document.escape import csv_frame  # slow to import: not before the search
+        from report.writers.place_report import write
+
         plans = {"own": movable.current} | ({"plan": result.best.plan} if result.best else {})
         for name, plan in plans.items():
             records.replace_text(directory / f"{name}.toml", text_of(plan))
-            pd.DataFrame(plan, columns=["x", "y"]).to_csv(directory / f"{name}.csv", index=False)
+            table = pd.DataFrame(plan, columns=["x", "y"])
+            if names:
+                table.insert(0, "name", [names.get(place, "") for place in plan])
+            csv_frame(table).to_csv(directory / f"{name}.csv", index=False)
             moved, made = _written_scene(directory / f"{name}.toml", study, law, cases_of, result)
             job = Job(moved, made, "newton", form, SERIES_TOLERANCE, LIMIT_MM, 0, THREADS)
             run_series(job, facts, directory / name, console)
         words, passed = sentence_on(result, goal, nodes)
         record = record_of(study, movable.current, holes, goal, result, nodes)
-        records.replace_object(directory / RECORD, record | {"said": words})
-        from report.writers.place_report import write  # slow to import: not before the search
-
+        labels = [names.get(place, "") for place in holes]
+        records.replace_object(directory / RECORD, record | {"said": words, "names": labels})
         steps = zip(result.order[1:], result.order, strict=False)
         added = tuple(next(iter(set(step.plan) - set(earlier.plan))) for step, earlier in steps)
         return Placement(plans.get("plan"), added, passed, words, write(directory))

@@ -41,8 +41,10 @@ def arrays_of(solution: Solution) -> dict[str, Any]:
         more, x, A = {"unknowns": x}, D @ x, sp.csc_array(D @ A)
         nodes = np.concatenate([scene.joint.nodes_of(name) for name in scene.joint.names])
     gaps = {"gap_before": solution.problem.load.g, "gap_after": solution.gap}
-    arrays = more | gaps | {"x": x, "lam": solution.lam}
+    arrays: dict[str, Any] = more | gaps | {"x": x, "lam": solution.lam}
     arrays |= {"A_data": A.data, "A_indices": A.indices, "A_indptr": A.indptr}
+    if isinstance(scene, JointScene) and (ids := scene.joint.ids) is not None:
+        arrays |= {"node_ids": ids[0], "contact_ids": ids[1]}
     return arrays if nodes is None else arrays | {"nodes": nodes, "contact_nodes": assembly.contact_nodes}
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from problems.errors import Fault
 from problems.forms import Form
+from problems.input.tables import AS_NAMED, TableOptions
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
@@ -34,6 +35,8 @@ class GapCases:
     gaps : Path, optional
         Measured gaps in place of random ones: .csv, .npz or .npy, one row per case, one column per contact,
         mm.
+    options : TableOptions, optional
+        Headings of the scan's columns x, y and gap, and marks of missing gaps.
 
     Examples
     --------
@@ -49,6 +52,7 @@ class GapCases:
     correlation_length: float | None = None
     around: Path | None = None
     gaps: Path | None = None
+    options: TableOptions = AS_NAMED
 
     @property
     def random_options(self) -> list[str]:
@@ -67,9 +71,9 @@ class GapCases:
     def of(self, scene: Scene, form: Form) -> LoadCases:
         """The load cases of a scene. Raises InputError, as `measured_gaps` and `random_gaps` do."""
         if self.gaps:
-            return measured_gaps(scene, self.gaps, self.count, form)
+            return measured_gaps(scene, self.gaps, self.count, form, self.options)
         law = self.mean, self.sd, self.correlation_length
-        return random_gaps(scene, self.count or RANDOM, self.seed or 0, *law, form, self.around)
+        return random_gaps(scene, self.count or RANDOM, self.seed or 0, *law, form, self.around, self.options)
 
 
 DEFAULT = GapCases()

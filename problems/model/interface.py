@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import scipy.sparse as sp
 
-from problems.forms.assembly import Mask, Matrix, Vector
+from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
 from .joint import Faults
 from .plate import Plate
@@ -52,6 +52,10 @@ class AnyJoint(Protocol):
     @property
     def shown(self) -> sp.csr_array | None:
         """D (d, n): Dx are the normal displacements at the nodes, part by part; None if x is that."""
+
+    @property
+    def ids(self) -> tuple[Indices, Indices] | None:
+        """The ids of the nodes at which Dx is given, and of the node of each contact; None without ids."""
 
     def with_contacts(self, pairs: tuple[Pair, ...]) -> AnyJoint:
         """The same with these contacts."""

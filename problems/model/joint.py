@@ -142,6 +142,10 @@ class Joint(Table):
         return None
 
     @property
+    def ids(self) -> None:
+        return None
+
+    @property
     def surface(self) -> Grid:
         return Grid(self.x, self.y)
 

@@ -24,7 +24,7 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from problems.errors import InputError
-from problems.forms.assembly import Mask, Matrix, Vector
+from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.input.bounded_types import Positive
 
 from .contact_pairing import Face, Pairing, paired, with_tool
@@ -228,12 +228,16 @@ class SuperelementJoint:
         start = sum(len(self.places(each)) for each in self.pairs[:index])
         return slice(start, start + len(self.places(pair)))
 
+    @property
+    def ids(self) -> tuple[Indices, Indices]:
+        nodes = {part.name: part.nodes.ids[part.contacts] for part in self.parts}
+        contacts = [nodes[pair[0]][self.pairings[pair].nodes] for pair in self.pairs]
+        return np.concatenate(list(nodes.values())), np.concatenate([np.zeros(0, np.intp), *contacts])
+
     def contact_name(self, index: int) -> str:
         """The pair and the node of a contact, by its place in λ."""
         pair = next(pair for pair in self.pairs if index < self.span(pair).stop)
-        node = self.pairings[pair].nodes[index - self.span(pair).start]
-        first = self._of[pair[0]]
-        return f"{' – '.join(pair)} at node {first.nodes.ids[first.contacts[node]]}"
+        return f"{' – '.join(pair)} at node {self.ids[1][index]}"
 
     def places(self, pair: Pair) -> Matrix:
         return self.faces[pair[0]].xyz[self.pairings[pair].nodes, :2]

@@ -30,13 +30,14 @@ def pair_name(pair: dict[str, Any]) -> str:
 def nodes(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
     """One line per node of each part."""
     names = [part["name"] for part in record["parts"] for _ in range(part["start"], part["stop"])]
-    return _places("part", names, arrays.get("nodes")).assign(displacement_mm=arrays["x"])
+    table = _places("part", names, arrays.get("nodes"), arrays.get("node_ids"))
+    return table.assign(displacement_mm=arrays["x"])
 
 
 def contacts(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
     """One line per contact of each pair."""
     names = [pair_name(pair) for pair in record["pairs"] for _ in range(pair["start"], pair["stop"])]
-    return _places("contact", names, arrays.get("contact_nodes")).assign(
+    return _places("contact", names, arrays.get("contact_nodes"), arrays.get("contact_ids")).assign(
         gap_before_mm=arrays["gap_before"], gap_after_mm=arrays["gap_after"], force_N=arrays["lam"]
     )
 
@@ -50,7 +51,8 @@ def fasteners(record: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=["kind", "contact", "x_mm", "y_mm", "force_N"])
 
 
-def _places(heading: str, names: list[str], places: Array | None) -> pd.DataFrame:
+def _places(heading: str, names: list[str], places: Array | None, ids: Array | None) -> pd.DataFrame:
     if places is None:
         return pd.DataFrame({heading: names, "index": range(len(names))})
-    return pd.DataFrame({heading: names, "x_mm": places[:, 0], "y_mm": places[:, 1]})
+    labels = {} if ids is None else {"node": ids}
+    return pd.DataFrame({heading: names} | labels | {"x_mm": places[:, 0], "y_mm": places[:, 1]})

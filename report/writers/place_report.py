@@ -134,12 +134,14 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
 
 def _order(record: dict[str, Any]) -> list[Block]:
     places: list[tuple[float, float]] = []
-    lines = []
+    lines, holes = [], zip(map(tuple, record["candidates"]), record["names"], strict=True)
+    labels = {place: label for place, label in holes if label}
     for step in record["order"]:
         new = [tuple(place) for place in step["plan"] if tuple(place) not in places]
         places += new
         x, y = new[0] if new else (np.nan, np.nan)
         at = dict(zip(("at_x_mm", "at_y_mm"), step["worst_at"], strict=True))
+        at |= {"name": labels.get((x, y), "")} if labels else {}
         lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]} | at)
     table = pd.DataFrame(lines)
     drawing = style.figure(3.0)
@@ -148,7 +150,8 @@ def _order(record: dict[str, Any]) -> list[Block]:
     axes.set(xlabel="fasteners set", ylabel="largest gap, mm", ylim=(0, None))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     names = {"x, mm": "x_mm", "y, mm": "y_mm", "gap after it, mm": "gap_mm"}
-    columns = [number("set", "set", whole), *(number(name, key) for name, key in names.items())]
+    columns = [number("set", "set", whole), *([word("hole", "name")] if labels else [])]
+    columns += [number(name, key) for name, key in names.items()]
     caption = "*The order that keeps the gap small*: the reverse of removing what is needed least."
     return [
         Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),

@@ -259,8 +259,15 @@ def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> Non
 @pytest.mark.slow
 def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: Path) -> None:
     """The scan in place of the scene's gap, or the law that options gave; `solve` takes them from there."""
-    (tmp_path / "scan.csv").write_text("x,y,gap\n0,0,0.03\n200,0,0.05\n0,50,0.06\n200,50,0.04\n")
-    assert place(strip, tmp_path / "a", "--count", 2, "--around", tmp_path / "scan.csv").exit_code == 0
+    scan, holes = tmp_path / "scan.csv", tmp_path / "holes.csv"
+    scan.write_text("X,Y,Z\n0,0,0.03\n200,0,0.05\n9,9,9999\n0,50,0.06\n200,50,0.04\n")
+    holes.write_text("name,X,Y\n" + "".join(f"H{x},{x},25\n" for x in range(20, 200, 40)))
+    read_by = ("--columns", "X,Y,Z", "--missing", 9999, "--candidates", holes)
+    done = place(strip, tmp_path / "a", "--count", 2, "--around", scan, *read_by)
+    assert done.exit_code == 0, done.output
+    for table, x in (("plan.csv", "x"), ("report/order.csv", "x_mm")):
+        lines = pd.read_csv(tmp_path / "a" / table).dropna()
+        assert list(lines["name"]) == [f"H{at:g}" for at in lines[x]]
     scene = read_scene(str(tmp_path / "a" / "plan.toml"))
     assert [effect.kind for effect in scene.effects] == ["fasteners", "measured_gap"]
     assert load_case(scene, effects=scene.effects).g[0] == pytest.approx(0.03)
