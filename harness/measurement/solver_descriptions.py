@@ -191,11 +191,11 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
     """Whether a row is of another scene, series, solver or accuracy, or hit a limit that is wider now."""
     law = m.series.model_dump(exclude={"cases"}) if m.series else {}
-    now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated, law)
+    now = (scene_key, solver.version, solver.code, m.suite.limit_mm, m.entry.gated, law)
     drawn = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
     solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
     before = (*solved, row.get("limit_asked_mm"), row.get("gated"), drawn)
     out_of_time = row["status"] in OUT_OF_TIME and row["time_limit_s"] < m.time_limit_s
-    left_behind = m.stop_at_times_fastest is not None and bool(row.get("stop"))
-    out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
+    left_behind = m.suite.stop_at_times_fastest is not None and bool(row.get("stop"))
+    out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.suite.memory_limit_mib
     return now != before or (out_of_time and not left_behind) or out_of_memory

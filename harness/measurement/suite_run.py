@@ -153,7 +153,7 @@ def pending_tasks(
         family = form_family(m.form)
         if family not in opened:
             with display.step(m.scene):
-                opened[family] = measurable(m.source, display, m.reference_limit_s, m.form)
+                opened[family] = measurable(m.source, display, m.suite.reference_limit_s, m.form)
         problem = opened[family]
         if m.form not in made:
             _ = in_form(problem.prepared, m.form).arrays  # before the clock starts

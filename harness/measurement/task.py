@@ -89,6 +89,12 @@ def rows_of(
     return [_row(*case, task.solver, problem, result.elapsed_s, origin) for case in cases]
 
 
+def why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | None:
+    if judgement.verdict != "cannot_be_judged":
+        return None
+    return f"reference error bound {problem.reference.bound_mm:.0e} mm: {problem.reference.route}"
+
+
 def _row(
     m: Measurement,
     answer: Path,
@@ -103,15 +109,13 @@ def _row(
     problem = problem.of_case(series, m.case)
     if report.get("answer") and report["status"] == "solved" and solver.owner == "ours":
         problem.add_candidate(m.solver, answer)
-    limit_mm, judgement = problem.limit_mm(m.limit_mm), Judgement("no_answer", problem.reference.bound_mm)
+    limit_mm = problem.limit_mm(m.suite.limit_mm)
+    judgement = Judgement("no_answer", problem.reference.bound_mm)
     if report.get("answer"):
         judgement = problem.judge_file(answer, limit_mm)
-    message = report.get("message")
-    if judgement.verdict == "cannot_be_judged":
-        message = f"reference error bound {problem.reference.bound_mm:.0e} mm: {problem.reference.route}"
     row: MeasurementRow = {
         "key": m.key,
-        "suite": m.suite,
+        "suite": m.suite.name,
         "scene": m.scene,
         "source": m.source,
         "solver": m.solver,
@@ -124,13 +128,13 @@ def _row(
         "tolerance": m.tolerance,
         "searched": m.searched,
         "repeat": m.repeat,
-        "options": m.options,
-        "gated": m.gated,
+        "options": m.entry.options,
+        "gated": m.entry.gated,
         "limit_mm": limit_mm,
-        "limit_asked_mm": m.limit_mm,
+        "limit_asked_mm": m.suite.limit_mm,
         "threads_asked": m.threads,
         "time_limit_s": m.time_limit_s,
-        "memory_limit_mib": m.memory_limit_mib,
+        "memory_limit_mib": m.suite.memory_limit_mib,
         "stop": m.stop or None,
         **origin,
         "scene_key": problem.scene.key,
@@ -144,4 +148,9 @@ def _row(
         row["overhead_s"] = elapsed_s - sum(measured[name] or 0.0 for name in ("load_s", *STEPS))
     else:
         row |= {"case": m.case, "series": series}
-    return {**row, **measured, **asdict(judgement), "message": message}
+    return {
+        **row,
+        **measured,
+        **asdict(judgement),
+        "message": why_not_judged(judgement, problem) or report.get("message"),
+    }

@@ -64,10 +64,11 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
     those that follow have its status.
     """
     first, finished, fields = measurements[0], list[Outcome](), Row()
-    phases = {"start": START_S, "solve": first.time_limit_s * (first.batched or 1), "save": SAVE_S}
+    phases = {"start": START_S, "solve": first.time_limit_s * (first.entry.batched or 1), "save": SAVE_S}
     job = measurements, answers
-    python = interpreter(first.requirements)
-    with Monitored(measure_here, job, first.threads, phases, first.memory_limit_mib, python) as process:
+    python = interpreter(first.entry.requirements or ())
+    memory_limit_mib = first.suite.memory_limit_mib
+    with Monitored(measure_here, job, first.threads, phases, memory_limit_mib, python) as process:
         for event in process:
             fields |= event
             if "status" in event:
@@ -114,7 +115,8 @@ class Run(Reporter):
     def outcomes(self) -> Iterator[Outcome]:
         """Solve the load cases: the last event of each."""
         m, files = self.first, self.answers
-        solver = make_solver(m.solver, m.options, Path(m.plugin) if m.plugin else None)
+        plugin = Path(m.suite.plugin) if m.suite.plugin else None
+        solver = make_solver(m.solver, m.entry.options, plugin)
         if m.form not in solver.forms:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.step("load_s"):
@@ -127,14 +129,15 @@ class Run(Reporter):
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
         session = SolverSession(solver, problem, m.tolerance, self)
-        if m.batched is None:
+        batched = m.entry.batched
+        if batched is None:
             for case, file in zip(cases, files, strict=True):
                 outcome = self.solved(session, case, file)
                 stored.check()
                 yield outcome
             return
-        for start in range(0, len(cases), m.batched):
-            some = slice(start, start + m.batched)
+        for start in range(0, len(cases), batched):
+            some = slice(start, start + batched)
             for outcome in self.solved_batch(session, cases[some], files[some]):
                 stored.check()
                 yield outcome
@@ -184,7 +187,7 @@ class Run(Reporter):
         self.begin_phase("solve")
         if not session.opened:
             self.report({"data_mib": resident_mib("VmRSS")})
-            session.open(batched=self.first.batched is not None)
+            session.open(batched=self.first.entry.batched is not None)
 
     def saved(
         self, answer: Answer, x: Vector | None, file: Path, problem: Problem, fields: Report
@@ -194,7 +197,7 @@ class Run(Reporter):
         peak = resident_mib("VmHWM")
         self.begin_phase("save")
         self.report({**fields, **threads_in_effect(), "peak_rss_mib": peak, "stages": stages})
-        if self.first.yardstick and problem.yardstick is not None:
+        if self.first.suite.yardstick and problem.yardstick is not None:
             self.report(yardstick(problem.yardstick))
         if x is None:
             return {"status": answer.status, "answer": None}

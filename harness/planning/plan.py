@@ -26,39 +26,47 @@ MOST_REPEATS = 5
 
 @dataclass(frozen=True)
 class Measurement:
-    """One solver on one scene in one form: what one process will do.
+    """One solver on one scene in one form: the work of one process.
 
-    scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
-    searched, paced : it may turn out to need no measuring (tolerance_search.py).
-    stop : why its time limit is tighter than the suite's, or "" (tolerance_search.py).
-    requirements : what its environment has in other versions than this one.
+    entry : the settings, one of the suite's. scene : the name in the tables; source : a name or an absolute
+    path for `read_scene`. case : the number of the load case in a series. stop : why the time limit is
+    tighter than the suite's, or "" (tolerance_search.py).
     """
 
-    suite: str
+    suite: Suite
+    entry: SolverEntry
     scene: str
     source: str
-    solver: str
     form: Form
-    variant: str
-    options: dict[str, Any]
     tolerance: float
     threads: int
     repeat: int
     time_limit_s: float
-    memory_limit_mib: int
-    limit_mm: float
-    gated: bool
-    plugin: str | None = None
-    yardstick: bool = False
-    series: RandomCases | None = None
     case: int | None = None
-    batched: int | None = None
-    reference_limit_s: float | None = None
-    searched: bool = False
-    paced: bool = False
-    stop_at_times_fastest: float | None = None
     stop: str = ""
-    requirements: tuple[str, ...] = ()
+
+    @property
+    def solver(self) -> str:
+        return self.entry.name
+
+    @property
+    def variant(self) -> str:
+        return self.entry.label
+
+    @property
+    def searched(self) -> bool:
+        """Whether the tolerance is one of a search (tolerance_search.py)."""
+        return (self.entry.tolerances or self.suite.tolerances) == "auto"
+
+    @property
+    def paced(self) -> bool:
+        """Whether the number of repeats depends on the seconds of the first."""
+        return (self.entry.repeats or self.suite.repeats) == "auto"
+
+    @property
+    def series(self) -> RandomCases | None:
+        series, cases = self.suite.series, self.entry.cases
+        return series.model_copy(update={"cases": cases}) if series and cases else series
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -70,13 +78,14 @@ class Measurement:
         """Identity of the measurement, the same in every run: '4386/0107 ipm dual tol=1e-09 …'."""
         words = [self.scene, self.solver, self.form, *([self.variant] if self.variant else [])]
         words += [f"tol={self.tolerance:g}", f"threads={self.threads}", f"repeat={self.repeat}"]
-        words += [] if self.batched is None else [f"batched={self.batched}"]
+        words += [] if self.entry.batched is None else [f"batched={self.entry.batched}"]
         words += [] if self.case is None else [f"case={self.case}"]
-        return " ".join(words + ([json.dumps(self.options, sort_keys=True)] if self.options else []))
+        options = self.entry.options
+        return " ".join(words + ([json.dumps(options, sort_keys=True)] if options else []))
 
     def same_settings(self, row: Mapping[str, Any]) -> bool:
         """Whether a row is of this solver, form, options and threads, whatever its scene and tolerance."""
-        mine = (self.solver, self.form, self.variant, self.options, self.threads)
+        mine = (self.solver, self.form, self.variant, self.entry.options, self.threads)
         return tuple(row[name] for name in ("solver", "form", "variant", "options", "threads_asked")) == mine
 
     @property
@@ -149,37 +158,12 @@ def _of_entry(
     asked = entry.tolerances or suite.tolerances
     tolerances = DECADES if asked == "auto" else asked
     n, _ = scene.expected_size or (0, 0)
+    time_limit_s = entry.time_limit_s or suite.time_limit(n)
+    cases = range(entry.cases or suite.series.cases) if suite.series else (None,)
     threads_asked = entry.threads or suite.threads
-    series = suite.series
-    if series is not None and entry.cases is not None:
-        series = series.model_copy(update={"cases": entry.cases})
-    cases = range(series.cases) if series else (None,)
     for form, tolerance, threads, case in product(entry.forms or FORMS, tolerances, threads_asked, cases):
         yield Measurement(
-            suite=suite.name,
-            scene=scene.name,
-            source=source,
-            solver=entry.name,
-            form=form,
-            variant=entry.label,
-            options=entry.options,
-            requirements=tuple(entry.requirements or ()),
-            tolerance=tolerance,
-            threads=threads,
-            repeat=repeat,
-            time_limit_s=entry.time_limit_s or suite.time_limit(n),
-            memory_limit_mib=suite.memory_limit_mib,
-            limit_mm=suite.limit_mm,
-            gated=entry.gated,
-            plugin=suite.plugin,
-            yardstick=suite.yardstick,
-            series=series,
-            case=case,
-            batched=entry.batched,
-            reference_limit_s=suite.reference_limit_s,
-            searched=asked == "auto",
-            paced=(entry.repeats or suite.repeats) == "auto",
-            stop_at_times_fastest=suite.stop_at_times_fastest,
+            suite, entry, scene.name, source, form, tolerance, threads, repeat, time_limit_s, case
         )
 
 
@@ -207,12 +191,12 @@ def of_key(plan: Sequence[Measurement], key: str) -> list[Measurement]:
     """
     chosen = next((m for m in plan if m.key == key), None)
     if chosen is None:
-        raise _unknown(plan[0].suite, key)
+        raise _unknown(plan[0].suite.name, key)
     if chosen.case is None:
         return [chosen]
-    batch = chosen.batched or 1
-    end = (chosen.case // batch + 1) * batch
-    same = (m for m in plan if (m.process, m.batched) == (chosen.process, chosen.batched))
+    batched = chosen.entry.batched
+    end = (chosen.case // (batched or 1) + 1) * (batched or 1)
+    same = (m for m in plan if (m.process, m.entry.batched) == (chosen.process, batched))
     return [m for m in same if m.case is not None and m.case < end]
 
 

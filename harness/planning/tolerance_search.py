@@ -75,13 +75,14 @@ def time_limit(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
         if row["scene"] == m.scene and row["verdict"] == "within" and row["repeat"] == 0
         if row["owner"] == "library" and row["solver"] != m.solver
     ]
-    if m.stop_at_times_fastest is None or not others:
+    times = m.suite.stop_at_times_fastest
+    if times is None or not others:
         return m.time_limit_s, ""
     fastest, name = min(others)
-    limit_s = max(LEAST_S, m.stop_at_times_fastest * fastest)
+    limit_s = max(LEAST_S, times * fastest)
     if limit_s >= m.time_limit_s:
         return m.time_limit_s, ""
-    return limit_s, f"{m.stop_at_times_fastest:g} × {name} ({fastest:.2g} s), at least {LEAST_S:g} s"
+    return limit_s, f"{times:g} × {name} ({fastest:.2g} s), at least {LEAST_S:g} s"
 
 
 def exceeded_on(m: Measurement, n: int, rows: Sequence[Row]) -> str:
@@ -98,7 +99,7 @@ def exceeded_on(m: Measurement, n: int, rows: Sequence[Row]) -> str:
     others = [row for row in rows if m.same_settings(row) and row["n"] == n and row["scene"] != m.scene]
     scenes = sorted({row["scene"] for row in others})
     exceeded = all(row["status"] in EXCEEDED for row in others)
-    return ", ".join(scenes) if m.stop_at_times_fastest and exceeded and len(scenes) > 1 else ""
+    return ", ".join(scenes) if m.suite.stop_at_times_fastest and exceeded and len(scenes) > 1 else ""
 
 
 def _of_cell(m: Measurement, rows: Sequence[Row]) -> list[Row]:

@@ -171,9 +171,9 @@ def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
         yield Finding(path.name, Judgement("cannot_be_judged"), LIMIT_MM, why)
     else:
         for measurement in expand(read_written(path)):
-            if measurement.gated and measurement.key not in rows:
+            if measurement.entry.gated and measurement.key not in rows:
                 why = "never measured: the run did not end"
-                yield Finding(measurement.key, Judgement("no_answer"), measurement.limit_mm, why)
+                yield Finding(measurement.key, Judgement("no_answer"), measurement.suite.limit_mm, why)
 
 
 def table(findings: list[Finding]) -> Table:

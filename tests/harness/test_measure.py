@@ -11,8 +11,9 @@ import tiny_joint
 from suite_runs import all_end
 
 from harness.measurement import child_process
-from harness.measurement.worker import measure
+from harness.measurement.worker import Outcome, measure
 from harness.planning.plan import Measurement
+from harness.planning.suite import SolverEntry, Suite
 
 pytestmark = pytest.mark.slow
 
@@ -33,16 +34,22 @@ def _cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
 
 
-def outcome(folder: Path, fault: str | None, to: str = "answer.npz", **changes: Any) -> dict[str, Any]:
+def outcome(
+    folder: Path,
+    fault: str | None = None,
+    to: str = "answer.npz",
+    solver: str = "",
+    plugin: bool = True,
+    **changes: Any,
+) -> Outcome:
     """The row of a measurement, which leaves no process, not even one whose parent is gone."""
-    solver = "faulty" if fault else "exact"
-    asked: dict[str, Any] = {
-        **{"suite": "s", "scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "variant": ""},
-        **{"tolerance": 1e-9, "threads": 1, "repeat": 0, "limit_mm": 1e-7, "gated": True},
-        **{"solver": solver, "options": {"fault": fault} if fault else {}},
-        **{"plugin": str(folder / f"{solver}.py"), "time_limit_s": 20.0, "memory_limit_mib": MIB},
-    }
-    row = measure([Measurement(**asked | changes)], [folder / to])[0]
+    name = solver or ("faulty" if fault else "exact")
+    entry = SolverEntry(name=name, options={"fault": fault} if fault else {})
+    file = str(folder / f"{name}.py") if plugin else None
+    suite = Suite(name="s", scenes=["tiny"], memory_limit_mib=MIB, plugin=file, solver=[entry])
+    asked = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
+    m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked | changes)
+    (row,) = measure([m], [folder / to])
     assert all_end(folder / "cache")
     return row
 
@@ -94,7 +101,7 @@ def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
 def test_what_an_answer_needed_from_the_scene_on(folder: Path, solver: str, form: str, stages: str) -> None:
     """In the sparse form the process makes the model; in a dense one it opens the stages it needs."""
     scene = {"scene": "gallery/three-part-stack", "source": "gallery/three-part-stack"}
-    row = outcome(folder, None, **scene, solver=solver, form=form, plugin=None)
+    row = outcome(folder, None, **scene, solver=solver, form=form, plugin=False)
     assert row["status"] == "solved"
     assert row["stages"] == stages
     if form == "sparse":
@@ -137,7 +144,7 @@ def test_a_fault_is_a_status_with_a_reason(folder: Path, fault: str, status: str
 def test_the_start_does_not_count_against_the_time_limit(folder: Path) -> None:
     slow = folder / "slow.py"
     slow.write_text("import time\ntime.sleep(1)\n" + tiny_joint.EXACT)
-    row = outcome(folder, None, solver="slow", plugin=str(slow), time_limit_s=0.5)
+    row = outcome(folder, None, solver="slow", time_limit_s=0.5)
     assert row["status"] == "solved"
 
 

@@ -288,9 +288,9 @@ def test_a_key_that_is_not_planned_is_bad_input(copy: Path, tmp_path: Path, key:
 def test_a_case_of_a_series_comes_after_those_before_it() -> None:
     """In whole batches; other processes are left out."""
     plan = expand(read_suite("series"))
-    batched = next(m for m in plan if m.batched and m.case == m.batched + 1)
+    batched = next(m for m in plan if m.entry.batched and m.case == m.entry.batched + 1)
     found = of_key(plan, batched.key)
-    assert [m.case for m in found] == list(range(2 * (batched.batched or 0)))
+    assert [m.case for m in found] == list(range(2 * (batched.entry.batched or 0)))
     assert {m.process for m in found} == {batched.process}
-    single = next(m for m in plan if not m.batched and m.case == 3)
+    single = next(m for m in plan if not m.entry.batched and m.case == 3)
     assert [m.case for m in of_key(plan, single.key)] == [0, 1, 2, 3]

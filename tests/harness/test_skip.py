@@ -33,6 +33,10 @@ def large():
     return next(m for m in plan() if m.scene == "6112/0600" and m.form == "primal")
 
 
+def stopped_at(m, times):
+    return replace(m, suite=m.suite.model_copy(update={"stop_at_times_fastest": times}))
+
+
 def test_limits_go_by_size(large):
     assert large.time_limit_s == 40
     assert {m.time_limit_s for m in plan() if m.scene == "4386/0107"} == {30}
@@ -41,7 +45,7 @@ def test_limits_go_by_size(large):
 
 @pytest.mark.parametrize("status", ["time_limit", "not_run", "memory_limit"])
 def test_what_exceeds_its_limits_on_all_of_two_scenes_is_not_run_on_a_third_of_the_size(large, status):
-    behind = replace(large, stop_at_times_fastest=3.0)
+    behind = stopped_at(large, 3.0)
     one, two = row("6112/1", status, 10.0, tolerance=1e-6), row("6112/2", limit=12.0)
     assert exceeded_on(behind, 6112, [one, two]) == "6112/1, 6112/2"
     assert not exceeded_on(large, 6112, [one, two])  # each loss is of interest where nothing is stopped
@@ -64,10 +68,10 @@ def test_what_is_not_run_says_so(large, tmp_path):
 
 @pytest.mark.parametrize("status", ["time_limit", "not_run"])
 def test_a_row_out_of_time_stands_until_there_is_more_of_it(large, status):
-    known = {"scene_key": "s", "solver_version": "1", "solver_code": "c", "gated": large.gated}
-    rows = [row("6112/0600", status, t, limit_mm=large.limit_mm) | known for t in (40.0, 39.0)]
+    known = {"scene_key": "s", "solver_version": "1", "solver_code": "c", "gated": large.entry.gated}
+    rows = [row("6112/0600", status, t, limit_asked_mm=large.suite.limit_mm) | known for t in (40.0, 39.0)]
     assert [outdated(r, large, Description(["primal"], "1", "c"), "s") for r in rows] == [False, True]
-    stopped, left_behind = rows[1] | {"stop": "10 × daqp"}, replace(large, stop_at_times_fastest=10.0)
+    stopped, left_behind = rows[1] | {"stop": "10 × daqp"}, stopped_at(large, 10.0)
     for m, expected in ((left_behind, False), (large, True)):
         assert outdated(stopped, m, Description(["primal"], "1", "c"), "s") is expected
 

@@ -43,7 +43,12 @@ def test_a_plan_is_the_product_of_what_the_suite_says(tmp_path: Path) -> None:
     first, last = plan_of(tmp_path)[0], plan_of(tmp_path)[-1]
     assert first.key == "tiny exact dual tol=1e-09 threads=1 repeat=0"
     assert last.key == "tiny piqp primal plain tol=1e-06 threads=1 repeat=0"
-    assert (first.gated, first.time_limit_s, last.gated, last.time_limit_s) == (True, 20, False, 3)
+    assert (first.entry.gated, first.time_limit_s, last.entry.gated, last.time_limit_s) == (
+        True,
+        20,
+        False,
+        3,
+    )
     assert Path(first.source).is_absolute()
 
 
@@ -181,7 +186,7 @@ class TestOverrides:
         )
         plan = expand(overridden(suite, change))
         assert len(plan) == 3 * 2 * 2
-        assert {(m.form, m.tolerance, m.threads, m.time_limit_s, m.memory_limit_mib) for m in plan} == {
+        assert {(m.form, m.tolerance, m.threads, m.time_limit_s, m.suite.memory_limit_mib) for m in plan} == {
             ("primal", 1e-4, 3, 7, 99)
         }
 
@@ -243,7 +248,7 @@ def test_a_version_is_part_of_what_a_row_is_of(tmp_path: Path) -> None:
     text = TWO + 'with = ["piqp==0.6.2", "numpy==2.1.0"]\n'
     plan = expand(read_suite(str(tiny_joint.write_suite(tmp_path, text))))
     assert plan[-1].key == "tiny piqp primal plain 0.6.2 numpy==2.1.0 tol=1e-06 threads=1 repeat=0"
-    assert plan[-1].requirements == ("piqp==0.6.2", "numpy==2.1.0")
+    assert plan[-1].entry.requirements == ["piqp==0.6.2", "numpy==2.1.0"]
     (entry,) = with_key(read_suite(str(tmp_path / "small.toml")), plan[-1].key).solver
     assert entry.label == "plain 0.6.2 numpy==2.1.0"
 

@@ -150,7 +150,7 @@ def test_the_suite_measures_every_rung_with_every_solver() -> None:
         ladders = {scene.rpartition("/")[0] for scene in taken[line]}
         assert taken[line] == {scene for scene in TAKEN if scene.rpartition("/")[0] in ladders}
         assert len(ladders) > 1
-    assert {m.solver for m in plan if m.gated} == {"ipm", "gi", "newton", "ipm-fast"}
+    assert {m.solver for m in plan if m.entry.gated} == {"ipm", "gi", "newton", "ipm-fast"}
 
 
 @pytest.mark.parametrize("m", [8, 16, 24, 32])
@@ -232,7 +232,7 @@ def test_the_suite_at_full_size_measures_every_rung_with_every_solver_of_ours() 
     plan = expand(suite)
     assert {m.scene for m in plan} == set(FULL)
     for name in FULL:
-        ours = {(m.solver, m.form) for m in plan if m.scene == name and m.gated}
+        ours = {(m.solver, m.form) for m in plan if m.scene == name and m.entry.gated}
         assert ours == GATED - ({("gi", "primal")} if "/11308-" in name else set())
-    assert len({m.solver for m in plan if not m.gated}) <= 2
+    assert len({m.solver for m in plan if not m.entry.gated}) <= 2
     assert not any(scene.startswith("hard-full/") for scene in read_suite("hard").scenes)

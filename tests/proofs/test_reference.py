@@ -11,7 +11,7 @@ from small_joints import make_joint, make_scene
 from small_problems import make_load, make_prepared
 
 from harness.conformance.known_problems import contact_rows
-from harness.measurement.task import _why_not_judged
+from harness.measurement.task import why_not_judged
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
 from harness.solving import session
@@ -155,10 +155,10 @@ def test_a_row_says_why_it_cannot_be_judged(tmp_path: Path) -> None:
         'scenes = ["hard/pivoting/fathi-008"]\nreference_limit_s = 0.001\n[[solver]]\nname = "newton"\n'
     )
     assert read_suite(str(suite)).reference_limit_s == 0.001
-    assert {m.reference_limit_s for m in expand(read_suite(str(suite)))} == {0.001}
+    assert {m.suite.reference_limit_s for m in expand(read_suite(str(suite)))} == {0.001}
     judgement = Judgement("cannot_be_judged", 1e-3)
     problem = reference_problem("hard/pivoting/fathi-008")
     wide = replace(problem)
     vars(wide)["reference"] = replace(problem.reference, bound_mm=1e-3, route=f"proven, {STOPPED}")
-    assert _why_not_judged(judgement, wide) == f"reference error bound 1e-03 mm: proven, {STOPPED}"
-    assert _why_not_judged(Judgement("within"), problem) is None
+    assert why_not_judged(judgement, wide) == f"reference error bound 1e-03 mm: proven, {STOPPED}"
+    assert why_not_judged(Judgement("within"), problem) is None
