@@ -1,7 +1,8 @@
-"""Conformance of a solver: small problems with known answers, findings in plain words."""
+"""Checks a solver on small problems with known answers; each fault is a finding in plain words."""
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from harness.solving.session import SolverSession
-from harness.solving.solver_answer import InvalidAnswer, checked, error_text, shown, vector
+from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
@@ -39,28 +40,28 @@ class Finding:
         return f"[{self.form}] {self.where}: {self.wrong}. {self.fix}."
 
 
-def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] | None = None) -> list[Finding]:
-    """All that is wrong with the solver in these forms (None: all that it takes), in this process.
+def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] = FORMS) -> list[Finding]:
+    """All that is wrong with the solver in those of these forms that it takes, in this process.
 
     A solver that ends the process or hangs is for isolated.py.
     """
     return first_of_each(findings(solver_factory, forms))
 
 
-def first_of_each(found: Iterable[Finding]) -> list[Finding]:
+def first_of_each(all_findings: Iterable[Finding]) -> list[Finding]:
     """The first finding of each kind in each form: one fault shows in many cases."""
     kinds: dict[tuple[str, str], Finding] = {}
-    for finding in found:
+    for finding in all_findings:
         kinds.setdefault((finding.form, finding.fix), finding)
     return list(kinds.values())
 
 
 def findings(
     factory: Callable[[], Solver],
-    forms: Sequence[Form] | None = None,
-    begin: Callable[[str], None] = lambda test: None,
+    forms: Sequence[Form] = FORMS,
+    begin: Callable[[Form, str], None] = lambda form, problem: None,
 ) -> Iterator[Finding]:
-    """All that is wrong, as it is found. begin : called with each form and problem before its test."""
+    """Each fault as soon as it shows. begin : called with the form and the name of each problem before it."""
     try:
         taken = factory().forms
     except (Exception, SystemExit) as error:
@@ -70,51 +71,51 @@ def findings(
         fix = 'Set it to a tuple of "primal", "dual" and "sparse", e.g. forms = ("dual",)'
         yield Finding("any", "forms", f"forms is {shown(taken)}", fix)
         return
-    for form in [form for form in taken if forms is None or form in forms]:
+    for form in [form for form in taken if form in forms]:
         try:
-            for known in known_problems(form):
-                begin(f"{form}, {known.name}")
-                yield from _check_problem(factory, known, form)
+            for trial in known_problems(form):
+                begin(form, trial.name)
+                yield from _check_problem(factory, trial, form)
         except _Raised as raised:
             yield raised.finding
 
 
-def _check_problem(factory: Callable[[], Solver], known: KnownProblem, form: Form) -> Iterator[Finding]:
-    """Each case by a solver of its own; then all by one solver, in each of the ways to solve several."""
-    problem, before = in_form(known.prepared, form), _fingerprint(known)
+def _check_problem(factory: Callable[[], Solver], trial: KnownProblem, form: Form) -> Iterator[Finding]:
+    """Check each case with a solver of its own; then all with one solver, in each way to solve several."""
+    problem, contents = in_form(trial.prepared, form), _contents(trial)
 
     def alone(case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
         return _Steps(factory(), problem).answer(case, tolerance)
 
-    answers = [alone(case) for case in known.cases]
-    wrong = [inspect(answer, known, case, form) for case, answer in zip(known.cases, answers, strict=True)]
+    answers = [alone(case) for case in trial.cases]
+    wrong = [inspect(answer, trial, case, form) for case, answer in zip(trial.cases, answers, strict=True)]
     yield from filter(None, wrong)
-    first, answer = known.cases[0], answers[0]
-    if wrong[0] and _apart(answer, alone(first, LOOSE), known, first) == 0.0:
+    first, answer = trial.cases[0], answers[0]
+    if wrong[0] and _apart(answer, alone(first, LOOSE), trial, first) == 0.0:
         what = f"wrong, and the same at tolerance {LOOSE:g}: if it iterates, it ignores the tolerance"
-        yield Finding(form, known.name, what, "Use the argument `tolerance` in the stopping test")
-    if not wrong[0] and _apart(answer, alone(first), known, first) > LIMIT_MM / 100:
+        yield Finding(form, trial.name, what, "Use the argument `tolerance` in the stopping test")
+    if not wrong[0] and _apart(answer, alone(first), trial, first) > LIMIT_MM / 100:
         what = "not repeatable: two fresh solvers answer the same problem differently"
-        yield Finding(form, known.name, what, "Fix random seeds; share nothing between solvers")
+        yield Finding(form, trial.name, what, "Fix random seeds; share nothing between solvers")
     for way, (what, fix) in WAYS.items():
-        some = way(_Steps(factory(), problem), known.cases)
-        for k, (case, answer) in enumerate(zip(known.cases, some, strict=bool(some))):
-            if not wrong[k] and (found := inspect(answer, known, case, form)):
-                words = f"right when solved alone, wrong {what} ({case.name}: {found.wrong})"
-                yield Finding(form, known.name, words, fix)
+        some = way(_Steps(factory(), problem), trial.cases)
+        for k, (case, answer) in enumerate(zip(trial.cases, some, strict=bool(some))):
+            if not wrong[k] and (fault := inspect(answer, trial, case, form)):
+                words = f"right when solved alone, wrong {what} ({case.name}: {fault.wrong})"
+                yield Finding(form, trial.name, words, fix)
                 break
-    if _fingerprint(known) != before:
+    if _contents(trial) != contents:
         fix = "Copy K, A, Q, f, g and p before writing into them"
-        yield Finding(form, known.name, "the solver changed the arrays that it was given", fix)
+        yield Finding(form, trial.name, "the solver changed the arrays that it was given", fix)
 
 
-def inspect(answer: Answer, known: KnownProblem, case: KnownCase, form: Form) -> Finding | None:
-    """What is wrong with the answer to a case at TOLERANCE, first of all; None if nothing is."""
+def inspect(answer: Answer, trial: KnownProblem, case: KnownCase, form: Form) -> Finding | None:
+    """The first fault of the answer to a case at TOLERANCE; None if there is none."""
 
     def finding(wrong: str, fix: str) -> Finding:
-        return Finding(form, f"{known.name}, {case.name}", wrong, fix)
+        return Finding(form, f"{trial.name}, {case.name}", wrong, fix)
 
-    prepared, load, problem = known.prepared, case.load, in_form(known.prepared, form)
+    prepared, load, problem = trial.prepared, case.load, in_form(trial.prepared, form)
     try:
         plain = checked(answer, problem)
     except InvalidAnswer as fault:
@@ -172,23 +173,23 @@ class _Steps(Reporter):
         return [self.answer(case) for case in cases]
 
     def as_series(self, cases: Sequence[KnownCase]) -> list[Answer]:
-        """Each but the first from the known answer of the case before."""
-        found = [self.answer(cases[0])]
-        for before, case in pairwise(cases):
-            x = before.x if "x" in self.problem.needs else None
-            gap = before.load.g - self.problem.assembly.A.T @ before.x
-            found.append(self.session.warm(case.load, WarmStart(before.load, before.lam, gap, x)))
-        return found
+        """Start each but the first from the known answer of the case before."""
+        answers = [self.answer(cases[0])]
+        for last, case in pairwise(cases):
+            x = last.x if "x" in self.problem.needs else None
+            gap = last.load.g - self.problem.assembly.A.T @ last.x
+            answers.append(self.session.warm(case.load, WarmStart(last.load, last.lam, gap, x)))
+        return answers
 
     def at_once(self, cases: Sequence[KnownCase]) -> list[Answer]:
-        """None at all if the solver cannot."""
+        """Solve all cases in one call; no answers if the solver cannot."""
         if self.session.batch is None:
             return []
         with self.step("batched"):
             return self.session.solve_batch([case.load for case in cases])
 
 
-#: Ways to solve several cases: what is wrong if only this goes wrong, and how to fix it.
+#: Ways to solve several cases, each with the words of a finding and its fix if only this way goes wrong.
 WAYS = {
     _Steps.one_by_one: (
         "as a second load case",
@@ -213,15 +214,14 @@ def _raised(form: str, step: str, error: BaseException) -> Finding:
     return Finding(form, step, what, "A solver that cannot go on returns Answer('failed', None)")
 
 
-def _apart(one: Answer, other: Answer, known: KnownProblem, case: KnownCase) -> float:
+def _apart(one: Answer, other: Answer, trial: KnownProblem, case: KnownCase) -> float:
     """max|x − x'| of the displacements that follow from the forces of two answers, mm; NaN without forces."""
     x = []
     for answer in (one, other):
-        try:
-            lam = vector("lam", getattr(answer, "lam", None), known.prepared.assembly.m)
-        except InvalidAnswer:
-            lam = None
-        x.append(known.prepared.recover(np.full_like(case.lam, np.nan) if lam is None else lam, case.load))
+        plain, _ = examined(answer, in_form(trial.prepared, "dual"))
+        if plain.lam is None:
+            return math.nan
+        x.append(trial.prepared.recover(plain.lam, case.load))
     return _largest(x[0] - x[1])
 
 
@@ -229,6 +229,6 @@ def _largest(difference: Vector) -> float:
     return float(np.abs(difference).max())
 
 
-def _fingerprint(known: KnownProblem) -> list[bytes]:
-    loads = [array for case in known.cases for array in (case.load.f, case.load.g, case.load.p)]
-    return [array.tobytes() for array in (*arrays_of(known.prepared), *loads)]
+def _contents(trial: KnownProblem) -> list[bytes]:
+    loads = [array for case in trial.cases for array in (case.load.f, case.load.g, case.load.p)]
+    return [array.tobytes() for array in (*arrays_of(trial.prepared), *loads)]

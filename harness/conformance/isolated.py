@@ -1,4 +1,4 @@
-"""`check` in a process of its own: a solver that hangs, ends its process or eats memory is a finding too."""
+"""Checks a solver in a process of its own, so that to hang, to crash or to eat memory is a finding, too."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from harness.terminal import DONE, FAILED
 from harness.terminal.console import ConsoleReporter
 from problems.errors import InputError
 from problems.reporter import SILENT, Reporter
-from solvers.base import Solver
+from report.document.numbers import counted
+from solvers.base import Form, Solver
 from solvers.registry import make_solver
 
 from .check import Finding, findings, first_of_each
@@ -35,25 +36,24 @@ def check(
 
     time_limit_s : for each problem in each form. Raises InputError if the solver cannot be imported or made.
     """
-    found, test = [], ""
+    faults, form, problem = [], "", "importing"
     phases = {"importing": IMPORT_S, "the test": time_limit_s}
     monitored = Monitored(check_here, (name, plugin), 1, phases, memory_limit_mib)
     with reporter.step(name), monitored as process:
         for event in process:
-            test = event.get("test", test)
+            form, problem = event.get("form", form), event.get("problem", problem)
             if "finding" in event:
-                found.append(Finding(**event["finding"]))
-            reporter.progress(test or "importing")
-        if not test:
+                faults.append(Finding(**event["finding"]))
+            reporter.progress(f"{form} {problem}".lstrip())
+        if not form:
             refuse_unimportable(event, process, plugin or "solvers", name)
     if "status" in event:
-        form, _, problem = test.partition(", ")
-        found.append(Finding(form, problem, event["message"][:LONGEST_TEXT], FIX))
-    return first_of_each(found)
+        faults.append(Finding(form, problem, event["message"][:LONGEST_TEXT], FIX))
+    return first_of_each(faults)
 
 
 def check_here(job: tuple[str, Path | None], events: Events) -> None:
-    """The same, in the process of its own."""
+    """Check the solver, in the process of its own."""
     name, plugin = job
 
     def factory() -> Solver:
@@ -61,8 +61,8 @@ def check_here(job: tuple[str, Path | None], events: Events) -> None:
         events.end_fork()
         return made
 
-    def begin(test: str) -> None:
-        events.report(phase="the test", test=test)
+    def begin(form: Form, problem: str) -> None:
+        events.report(phase="the test", form=form, problem=problem)
 
     try:
         factory()
@@ -77,15 +77,13 @@ def check_here(job: tuple[str, Path | None], events: Events) -> None:
 def run(
     names: Sequence[str], plugin: Path | None, time_limit_s: float, memory_limit_mib: int, console: Console
 ) -> int:
-    """Check one solver after another, and print what is found. Returns 0 if nothing is wrong, else 1."""
-    faulty = False
+    """Check one solver after another, and print the faults. Returns 0 if there are none, else 1."""
+    code = DONE
     for name in names:
-        found = check(name, plugin, time_limit_s, memory_limit_mib, ConsoleReporter(console))
-        faulty |= bool(found)
-        console.print(
-            f"{name}: {len(found) or 'no'} fault{'s' if len(found) != 1 else ''}",
-            style="red" if found else "green",
-        )
-        for finding in found:
+        faults = check(name, plugin, time_limit_s, memory_limit_mib, ConsoleReporter(console))
+        number = counted(len(faults), "fault") if faults else "no faults"
+        console.print(f"{name}: {number}", style="red" if faults else "green")
+        for finding in faults:
             console.print(f"  {finding}", highlight=False, markup=False)
-    return FAILED if faulty else DONE
+            code = FAILED
+    return code

@@ -1,7 +1,7 @@
-"""Answers while a scene's loads and gaps change: matrices are made once, each answer starts from the last.
+"""Answers a scene while its loads and gaps change: matrices are made once, each answer starts from the last.
 
-What moves, and how, is a change of the scene's effects: places and preload of its fasteners, the pressures,
-the mean of the initial gap. An effect's own forces and gaps are kept as long as it stays the same.
+Settings change the scene's effects: the places and preload of its fasteners, the pressures, the mean of the
+initial gap. The forces and gaps of an effect are kept as long as it stays the same.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from problems.model.scene import JointScene, Scene
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import DualStart
 
-TOLERANCE_MM, PROVEN_MM = 1e-5, 1e-9  # until it is proven, and to be
+TOLERANCE_MM, PROVEN_MM = 1e-5, 1e-9  # of the first answer, and of the proven one
 CHANGED = (*MOVED, "initial_gap", "pressure")
 PAGE = "page"  # where a wrong value was given
 
@@ -50,13 +50,13 @@ class Settings:
     @classmethod
     def of(cls, scene: Scene) -> Settings:
         """Raises InputError if the scene has no fasteners that can move."""
-        found = movable_fasteners(scene)
+        fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
-        marks = np.concatenate([each.marks(scene.joint) for each in found])
-        means = tuple(each.mean for each in scene.effects_of(InitialGap))
-        pressures = tuple(each.value for each in scene.effects_of(Pressure))
+        marks = np.concatenate([effect.marks(scene.joint) for effect in fasteners])
+        means = tuple(gap.mean for gap in scene.effects_of(InitialGap))
+        pressures = tuple(pressure.value for pressure in scene.effects_of(Pressure))
         places = tuple((x, y) for x, y in marks.tolist())
-        return cls(places, found[0].preload, means, pressures)
+        return cls(places, fasteners[0].preload, means, pressures)
 
     def applied(self, scene: JointScene) -> tuple[Effect, ...]:
         """The scene's effects with these values. Raises InputError, as `validate` does."""
@@ -97,7 +97,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Answer:
-    """λ (m,) N, gap (m,) mm, and the load case. error_mm : proven, of any gap; None while it is not known."""
+    """The answer to some settings: λ (m,) N, gap (m,) mm. error_mm : of any gap; None until it is proven."""
 
     settings: Settings
     load: DualLoadCase
@@ -107,7 +107,7 @@ class Answer:
 
 
 class Explorer:
-    """A scene's matrices, kept."""
+    """Answers settings on the matrices of a scene, which are made once."""
 
     def __init__(self, scene: JointScene, form: Form) -> None:
         self.scene, self.form = scene, form
@@ -117,9 +117,9 @@ class Explorer:
         self.contribution = lru_cache(maxsize=256)(self._contribution)
 
     def answer(self, settings: Settings, near: Answer | None = None) -> Answer:
-        """From the last one. Raises InputError if a setting is wrong."""
+        """The answer to settings, started from `near`. Raises InputError if a setting is wrong."""
         effects = settings.applied(self.scene)
-        parts = [self.contribution(each) for each in effects if not isinstance(each, StiffnessEffect)]
+        parts = [self.contribution(one) for one in effects if not isinstance(one, StiffnessEffect)]
         none = self.contribution(None)
         f, g = sum((f for f, _ in parts), none[0]), sum((g for _, g in parts), none[1])
         (load,) = self.data.with_p([LoadCase(f, g)])
@@ -132,11 +132,11 @@ class Explorer:
         return Answer(settings, load, *self.sweeps.vectors(self.sweeps.solved(load, tolerance, start)))
 
     def proven(self, answer: Answer) -> Answer:
-        """The same to more digits, with the gaps and the error of the proven one."""
+        """The answer solved to more digits, with proven gaps and their error."""
         answer = self._solved(answer.settings, answer.load, PROVEN_MM, answer)
-        (found,) = assess(self.proof, [answer.load], [answer.lam], [None], LIMIT_MM / 2)
-        error = self.gap_error(answer.load.g, found.x, found.bound_mm)
-        return replace(answer, gap=found.gap, error_mm=float(error.max(initial=0.0)))
+        (assessed,) = assess(self.proof, [answer.load], [answer.lam], [None], LIMIT_MM / 2)
+        error = self.gap_error(answer.load.g, assessed.x, assessed.bound_mm)
+        return replace(answer, gap=assessed.gap, error_mm=float(error.max(initial=0.0)))
 
     def _contribution(self, effect: Effect | None) -> tuple[Vector, Vector]:
         """f and g of one effect; of None, zeros."""

@@ -1,7 +1,7 @@
-"""The page in a browser: the gap map with its fasteners to drag, sliders, the outcome, a kept plan beside it.
+"""The page in a browser: a gap map with fasteners to drag, sliders, the outcome, a kept plan beside it.
 
 Bokeh's server calls `changed` when a fastener is let go or a slider stops; the answer is drawn at once and
-proven right after. An answer that is not of the settings on the page is shown grey.
+proven right after. If the settings on the page are wrong, the last answer stays, in grey.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Page:
         self.kept_cells = ColumnDataSource(dict(self.cells.data))
         self.fasteners = ColumnDataSource(_columns(first.settings))
         self.kept_fasteners = ColumnDataSource(_columns(first.settings))
-        self.said, self.kept_said, self.fault = Div(width=WIDE), Div(width=WIDE), Div(width=WIDE)
+        self.outcome, self.kept_outcome, self.fault = Div(width=WIDE), Div(width=WIDE), Div(width=WIDE)
         self.sliders = self._sliders(first.settings, limit_mm)
         self.path = TextInput(title="scene file", value=str(Path(source).stem) + "-moved.toml")
         self.fasteners.on_change("data", self.changed)
@@ -76,13 +76,13 @@ class Page:
         self.keep()
 
     def _sliders(self, settings: Settings, limit_mm: float) -> dict[str, Slider]:
-        found = {"limit": _slider("limit, mm", limit_mm), "preload": _slider("preload, N", settings.preload)}
+        made = {"limit": _slider("limit, mm", limit_mm), "preload": _slider("preload, N", settings.preload)}
         for k, gap in enumerate(self.explorer.scene.effects_of(InitialGap)):
             where = "" if gap.between is None else f" {' – '.join(gap.between)}"
-            found[f"mean {k}"] = _slider(f"mean gap{where}, mm", settings.means[k])
+            made[f"mean {k}"] = _slider(f"mean gap{where}, mm", settings.means[k])
         for k, effect in enumerate(self.explorer.scene.effects_of(Pressure)):
-            found[f"pressure {k}"] = _slider(f"pressure on {effect.part}, N/mm²", effect.value)
-        return found
+            made[f"pressure {k}"] = _slider(f"pressure on {effect.part}, N/mm²", effect.value)
+        return made
 
     def _layout(self) -> Any:
         keep, save = Button(label="Keep this plan"), Button(label="Save as a scene")
@@ -92,7 +92,7 @@ class Page:
         now = self._map("now", self.cells, self.fasteners, draws=True)
         then = self._map("kept", self.kept_cells, self.kept_fasteners, draws=False)
         dials = column(*self.sliders.values(), self.path, row(keep, save), hint)
-        maps = column(self.said, now, self.fault, self.kept_said, then)
+        maps = column(self.outcome, now, self.fault, self.kept_outcome, then)
         return row(maps, dials)
 
     def _map(self, title: str, cells: ColumnDataSource, fasteners: ColumnDataSource, draws: bool) -> Any:
@@ -125,7 +125,7 @@ class Page:
 
     @property
     def settings(self) -> Settings:
-        """What the page asks for."""
+        """The settings that the page shows."""
         data = self.fasteners.data
         places = ((float(x), float(y)) for x, y in zip(data["x"], data["y"], strict=True))
         values = {name: float(format(slider.value, EXACT)) for name, slider in self.sliders.items()}
@@ -136,12 +136,12 @@ class Page:
         return Settings(tuple(map(self.rounded, places)), values["preload"], means, pressures)
 
     def rounded(self, place: tuple[float, float]) -> tuple[float, float]:
-        """A place to the micrometre; one of the scene's own as it is there."""
+        """A place rounded to the micrometre; a place of the scene's own fasteners unchanged."""
         x, y = place
         return place if place in self.first.places else (round(x, DIGITS), round(y, DIGITS))
 
     def changed(self, attr: str, old: object, new: object) -> None:
-        """Answer what the page asks for, or say what is wrong with it."""
+        """Answer the settings that the page shows, or say what is wrong with them."""
         self.colours.high = float(self.sliders["limit"].value)
         try:
             if self.settings != self.answer.settings:
@@ -157,7 +157,7 @@ class Page:
         self.show()
 
     def prove(self) -> None:
-        """Say how sure the answer is; in its map nothing would be seen to change."""
+        """Say how sure the answer is; the map stays, as no change would be seen in it."""
         self.pending = None
         self.answer = self.explorer.proven(self.answer)
         self.say()
@@ -167,7 +167,7 @@ class Page:
         self.say()
 
     def say(self) -> None:
-        self.said.text = outcome(self.answer, self.places, float(self.sliders["limit"].value))
+        self.outcome.text = outcome(self.answer, self.places, float(self.sliders["limit"].value))
 
     def keep(self) -> None:
         """Show this plan beside those to come."""
@@ -175,7 +175,7 @@ class Page:
             self.prove()
         self.kept_cells.data = dict(self.cells.data)
         self.kept_fasteners.data = _columns(self.answer.settings)
-        self.kept_said.text = f"Kept: {self.said.text}"
+        self.kept_outcome.text = f"Kept: {self.outcome.text}"
 
     def save(self) -> None:
         """Write the settings as a scene, and say how to solve it."""
@@ -196,8 +196,8 @@ class Page:
             return
         limit = self.sliders["limit"].value
         out = shlex.quote(f"results/{path.stem}")
-        said = f"python -m harness solve {shlex.quote(str(path))} --allow-gap {limit:g} --out {out}"
-        self.fault.text = f"Saved. <code>{escape(said)}</code>"
+        command = f"python -m harness solve {shlex.quote(str(path))} --allow-gap {limit:g} --out {out}"
+        self.fault.text = f"Saved. <code>{escape(command)}</code>"
 
 
 def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
@@ -223,7 +223,9 @@ def serve(
 ) -> None:
     """Serve pages to this machine alone, under an address that nobody can guess, until interrupted."""
     token = secrets.token_urlsafe(16)
-    application = Application(FunctionHandler(lambda each: Page(explorer, source, limit_mm, first, each)))
+    application = Application(
+        FunctionHandler(lambda document: Page(explorer, source, limit_mm, first, document))
+    )
     server = Server({f"/{token}": application}, address="127.0.0.1", port=0, use_index=False)
     server.start()
     ready(f"http://localhost:{server.port}/{token}")

@@ -1,4 +1,4 @@
-"""A picture of contacts: to each pixel the nearest one, so that any layout of nodes is drawn as an image."""
+"""Draws any layout of contacts as an image: each pixel shows the nearest contact."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ FINEST = 2.0  # pixels per mean distance of contacts, along each axis
 
 @dataclass(frozen=True)
 class Raster:
-    """A picture of contacts. low, high : (2,) its corners, mm. nearest : (rows, columns) the contact of each
-    pixel, or their number where none is near.
+    """An image of contacts. low, high : (2,) its corners, mm. nearest : (rows, columns) the contact of each
+    pixel, or m where none is near.
     """
 
     low: Vector
@@ -25,7 +25,7 @@ class Raster:
 
     @classmethod
     def of(cls, places: Matrix) -> Raster:
-        """A pixel per contact of a full grid. places : (m, 2) mm."""
+        """An image with a pixel per contact where the contacts form a full grid. places : (m, 2) mm."""
         extent = np.ptp(places, axis=0)
         mean = float(np.sqrt(extent.prod() / len(places))) or float(extent.max()) / len(places) or 1.0
         lines = np.array([len(np.unique(axis.round(6))) for axis in places.T])

@@ -1,13 +1,14 @@
-"""A scene as files for other programs, and K, A, f, g from the files of other programs as a scene's .npz.
+"""Writes a scene as files for other programs, and a scene's .npz from the K, A, f, g of other programs.
 
 A scene is written as K, A, f, g, or as a quadratic program with the accuracy to reach:
 
     min ½zᵀPz + qᵀz   subject to   Gz ≤ h     primal: z = x, n displacements, mm; sparse: z = û, N unknowns
                                    z ≥ lb     dual: z = λ, m contact forces, N
 
-P, q, G, h or lb; with the reference also x (mm), lam (the multipliers of Gz ≤ h, N), bound_mm, the proven
-bound on max|x − x*|, and limit_mm, within which an answer has to be. As a folder of Matrix Market files, one
-per array and with 17 digits, or as one .npz; about.json, or the texts in the .npz, say which problem it is.
+The arrays are P, q, and G, h or lb; with the reference also x (mm), lam (the multipliers of Gz ≤ h, N),
+bound_mm, the proven bound on max|x − x*|, and limit_mm, the largest error that an answer may have. They are
+written as a folder of Matrix Market files, one per array and with 17 digits, or as one .npz; about.json, or
+the texts in the .npz, name the problem.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from problems.input import matrix_files
 from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import Scene
 from problems.scene_files import read_scene
+from report.document.numbers import counted
 
 from .validate import digits_sentence, print_facts
 
@@ -61,9 +63,7 @@ def export(
         allowed = f"one of {', '.join(formats.FORMATS)}; none with --form"
         raise InputError.one("--format", "format", format, allowed)
     if form is not None and format is not None:
-        allowed = (
-            "none with --form: it holds K, A, f, g; PATH.npz is one file, any other PATH a folder of .mtx"
-        )
+        allowed = "none with --form: PATH.npz is one file, any other PATH a folder of .mtx"
         raise InputError.one("--format", "format", format, allowed)
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     scene = read_scene(source)
@@ -73,13 +73,13 @@ def export(
         data = matrices(problem.prepared, problem.load)
         with atomic_output(out, scene.sources) as new:
             formats.FORMATS[format].write(new, data)
-        said = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
+        content = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
     elif form is not None:
         arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
         with atomic_output(out, scene.sources) as new:
             (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
-        said = f"{form} form, {len(arrays['q'])} unknowns, {about['m']} contacts"
-    console.print(f"{out}: {scene.name}, {said}.")
+        content = f"{form} form, {len(arrays['q'])} unknowns, {counted(about['m'], 'contact')}"
+    console.print(f"{out}: {scene.name}, {content}.")
 
 
 def _refuse_suffix(out: Path, kind: formats.Format, program: bool) -> None:
@@ -94,15 +94,17 @@ def _refuse_suffix(out: Path, kind: formats.Format, program: bool) -> None:
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:
     """K, A, f, g of a problem, and its nodes if they are known."""
-    assembly = data.assembly
-    found = {"K": sp.csr_array(assembly.K.matrix), "A": sp.csc_array(assembly.A), "f": load.f, "g": load.g}
-    return found | ({} if assembly.nodes is None else {"nodes": np.array(assembly.nodes)})
+    K, A, nodes = data.assembly.K.matrix, data.assembly.A, data.assembly.nodes
+    arrays = {"K": sp.csr_array(K), "A": sp.csc_array(A), "f": load.f, "g": load.g}
+    return arrays if nodes is None else arrays | {"nodes": np.array(nodes)}
 
 
 def _program(
     source: str, scene: Scene, form: Form, with_reference: bool, limit_s: float | None
 ) -> tuple[Arrays, Arrays]:
-    """Its arrays by name, and what it is of; refuses a dense one that this machine's memory cannot hold."""
+    """The arrays of the quadratic program by name, and its facts. Raises InputError, also if a dense form
+    does not fit into the memory of this machine.
+    """
     chosen_form(scene, FORMS, form)
     judged = reference_problem(source, limit_s=limit_s, form=form) if with_reference else opened(scene, form)
     problem = in_form(judged.prepared, form)
@@ -115,15 +117,15 @@ def _program(
     else:
         arrays |= {"G": problem.G, "h": problem.h(load)}
     if with_reference:
-        known = judged.reference
-        arrays |= {"x": known.x, "lam": known.lam, "bound_mm": np.array([known.bound_mm])}
-        arrays["limit_mm"] = np.array([judged.limit_mm(LIMIT_MM)])
+        reference, limit_mm = judged.reference, judged.limit_mm(LIMIT_MM)
+        arrays |= {"x": reference.x, "lam": reference.lam}
+        arrays |= {"bound_mm": np.array([reference.bound_mm]), "limit_mm": np.array([limit_mm])}
     about = {"scene": scene.name, "title": scene.title, "scene_key": scene.key, "form": form}
     return arrays, about | {"n": problem.assembly.n, "m": problem.assembly.m}
 
 
 def _write_npz(path: Path, arrays: Arrays, about: Arrays) -> None:
-    """Matrices of the sparse form as compressed columns, all others whole."""
+    """Write the matrices of the sparse form as compressed columns, all others dense."""
     whole = about["form"] != "sparse"
     arrays = {name: M.toarray() if whole and sp.issparse(M) else M for name, M in arrays.items()}
     matrix_files.write(path, {name: np.array(value) for name, value in about.items()} | arrays)
@@ -145,9 +147,9 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     """
     if out.suffix != ".npz":
         raise InputError.one("--out", "path", str(out), "must end in .npz, which makes it a scene")
-    given = [*map(_source, files)]
-    with atomic_output(out, [path for _, path, _ in given]) as new:
-        data, origin, notes = _read_all(given)
+    sources = [*map(_source, files)]
+    with atomic_output(out, [path for _, path, _ in sources]) as new:
+        data, origin, notes = _read_all(sources)
         checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)
         formats.FORMATS["npz"].write(new, data | {name: sp.csr_array(data[name]) for name in "KA"})
         problem = _opened(new, origin)
@@ -172,10 +174,10 @@ def _source(text: str) -> tuple[str, Path, str]:
     return name, Path(file), matrix
 
 
-def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[str, Path], list[str]]:
+def _read_all(sources: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[str, Path], list[str]]:
     """K, A, f, g and perhaps nodes, their files, and sentences on what may be meant otherwise.
 
-    What is named overrides the rest.
+    A matrix named in the command overrides one of that name in another file.
     """
     data: formats.Data = {}
     origin: dict[str, Path] = {}
@@ -184,27 +186,27 @@ def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[st
     rows = ""
     for named in (False, True):
         of_rank: dict[str, Path] = {}
-        for name, path, matrix in given:
+        for name, path, matrix in sources:
             if bool(name) != named:
                 continue
             if name:
-                found = {name: formats.read_stiffness(path, matrix, name)}
+                read = {name: formats.read_stiffness(path, matrix, name)}
             else:
-                found = formats.read_labelled(path, partial(_of_problem, faults, path))
-            for key, (values, labels) in found.items():
+                read = formats.read_labelled(path, partial(_of_problem, faults, path))
+            for key, (values, labels) in read.items():
                 if key in of_rank:
                     allowed = f"is in {of_rank[key]} too; say {key}=FILE for the one that counts"
                     faults.append(Fault(str(path), "matrix", key, allowed))
                 data[key] = formats.vector(values) if key in ("f", "g") else values
                 if key == "K":
                     rows = _order(labels)
-            of_rank |= dict.fromkeys(found, path)
+            of_rank |= dict.fromkeys(read, path)
         origin |= of_rank
     for name, matrix, axis in (("f", "K", 0), ("g", "A", 1)):
         if name not in data and matrix in data and formats.format_of(origin[matrix]).omits_zeros:
             data[name], origin[name] = np.zeros(data[matrix].shape[axis]), origin[matrix]
             notes.append(f"{name} is in none of the files: zero, as {origin[matrix]} leaves zeros out.")
-    files = ", ".join(str(path) for _, path, _ in given)
+    files = ", ".join(str(path) for _, path, _ in sources)
     faults += [Fault(files, name, None, "is in none of the files") for name in "KAfg" if name not in data]
     if faults:
         raise InputError(faults)
@@ -214,7 +216,7 @@ def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[st
 
 
 def _of_problem(faults: list[Fault], path: Path, names: Sequence[str]) -> list[str]:
-    """The names of a problem; others are added to the faults."""
+    """Those names that a problem has; the others are added to the faults."""
     allowed = "K, A, f, g or nodes; say K=FILE, or K=FILE:NAME where the matrix has another name"
     faults += [Fault(str(path), "matrix", name, allowed) for name in names if name not in NAMES]
     return [name for name in names if name in NAMES]

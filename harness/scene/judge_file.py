@@ -1,4 +1,4 @@
-"""The verdict on an answer that another program has computed: x or λ from a .npz or .csv file."""
+"""Judges an answer that another program has computed: x or λ from a .npz or .csv file."""
 
 from __future__ import annotations
 
@@ -45,64 +45,47 @@ def judge_file(
     """
     if not 0 < limit_mm < inf:
         raise InputError.one("--limit", "limit, mm", limit_mm, "must be positive and finite")
-    given = read_answer(path)
+    answer = read_answer(path)
     problem = reference_problem(source, limit_s=reference_limit_s, form=form)
     assembly = problem.prepared.assembly
     for name, size in (("x", assembly.n), ("lam", assembly.m)):
-        if name in given and len(given[name]) != size:
+        if name in answer and len(answer[name]) != size:
             allowed = f"{size} in the {form} form of {problem.scene.name}; name another form with --form"
-            raise Incomparable.one(path, f"length of {name}", len(given[name]), allowed)
-    x, lam = given.get("x"), given.get("lam")
-    if x is None:
-        assert lam is not None
-        x = problem.prepared.recover(lam, problem.load)
-    forces = np.full(assembly.m, np.nan) if lam is None else lam
+            raise Incomparable.one(path, f"length of {name}", len(answer[name]), allowed)
+    lam = answer.get("lam", np.full(assembly.m, np.nan))
+    x = answer["x"] if "x" in answer else problem.prepared.recover(lam, problem.load)
     limit = problem.limit_mm(limit_mm)
-    found = problem.judged(x, forces, limit)
-    console.print(_table(problem, found, x))
-    console.print(_sentence(problem, found, limit), style=STYLES[found.verdict])
-    return CODES[found.verdict]
+    judgement, bound = problem.judged(x, lam, limit), problem.reference.bound_mm
+    console.print(_table(problem, judgement, x))
+    text = f"{judgement.verdict.capitalize()} {limit:.3g} mm."
+    if judgement.verdict == "cannot_be_judged":
+        how = problem.reference.route
+        text = f"Cannot be judged: the reference is proven only to {bound:.1e} mm ({how})."
+    console.print(text, style=STYLES[judgement.verdict])
+    return CODES[judgement.verdict]
 
 
-def _sentence(problem: ReferenceProblem, found: Judgement, limit_mm: float) -> str:
-    if found.verdict == "cannot_be_judged":
-        bound = problem.reference.bound_mm
-        return (
-            f"Cannot be judged: the reference is proven only to {bound:.1e} mm ({problem.reference.route})."
-        )
-    return f"{found.verdict.capitalize()} {limit_mm:.3g} mm."
-
-
-def _table(problem: ReferenceProblem, found: Judgement, x: Vector) -> Table:
+def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
     """The judge's figures, and where the largest error is."""
+    error, bound = judgement.displacement_error_mm or 0.0, problem.reference.bound_mm
+    assembly = problem.prepared.assembly
+    nodes, away = assembly.at_junction(assembly.nodes), assembly.at_junction(abs(x - problem.reference.x))
+    worst = int(np.argmax(away))
+    at = f"entry {worst}" if nodes is None else position(nodes[worst], nodes)
     table = Table("figure", "value", title=f"{problem.scene.name}: the answer judged")
-    error, bound = found.displacement_error_mm or 0.0, problem.reference.bound_mm
-    figures = {
-        "largest displacement error, mm": f"{error:.3e} {_place(problem, x)}",
-        "proven: every displacement within, mm": f"{error + bound:.3e}",
-        "error bound of the reference, mm": f"{bound:.1e}",
-        "contacts open or closed by mistake": str(found.contact_mismatch),
-        "largest overlap, mm": f"{found.primal_residual or 0.0:.3e}",
-    }
-    if found.dual_residual is not None:
-        figures |= {
-            "largest unbalanced force, N": f"{found.dual_residual:.3e}",
-            "duality gap, N·mm": f"{found.duality_gap:.3e}",
-        }
-    for name, value in figures.items():
-        table.add_row(name, value)
+    table.add_row("largest displacement error, mm", f"{error:.3e} at {at}")
+    table.add_row("proven: every displacement within, mm", f"{error + bound:.3e}")
+    table.add_row("error bound of the reference, mm", f"{bound:.1e}")
+    table.add_row("contacts open or closed by mistake", str(judgement.contact_mismatch))
+    table.add_row("largest overlap, mm", f"{judgement.primal_residual or 0.0:.3e}")
+    if judgement.dual_residual is not None:
+        table.add_row("largest unbalanced force, N", f"{judgement.dual_residual:.3e}")
+        table.add_row("duality gap, N·mm", f"{judgement.duality_gap:.3e}")
     return table
 
 
-def _place(problem: ReferenceProblem, x: Vector) -> str:
-    assembly = problem.prepared.assembly
-    nodes = assembly.at_junction(assembly.nodes)
-    worst = int(np.argmax(assembly.at_junction(abs(x - problem.reference.x))))
-    return f"at entry {worst}" if nodes is None else f"at {position(nodes[worst], nodes)}"
-
-
 def read_answer(path: Path) -> dict[str, Vector]:
-    """What the file holds: "x" (displacements) and "lam" (contact forces), or one of them.
+    """The vectors of a file by name: "x" (displacements) and "lam" (contact forces), or one of them.
 
     An .npz has arrays of the names in HEADINGS, a .csv columns, as nodes.csv and contacts.csv of `solve`;
     never both names of one vector. Raises InputError.
@@ -114,23 +97,23 @@ def read_answer(path: Path) -> dict[str, Vector]:
         if path.suffix.lower() == ".npz":
             with np.load(path, allow_pickle=False) as archive:
                 names = archive.files
-                found = _named(names, archive.__getitem__)
+                vectors = _named(names, archive.__getitem__)
         else:
             columns = _columns(path)
-            found = _named(names := list(columns), columns.__getitem__)
+            vectors = _named(names := list(columns), columns.__getitem__)
     except InputError:
         raise
     except Exception as error:  # numpy, zipfile and csv raise kinds of their own
         raise InputError.one(path, "file", damage(error), ALLOWED) from error
-    if not found:
-        wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
+    if not vectors:
+        wanted = " or ".join(name for headings in HEADINGS.values() for name in headings)
         raise InputError.one(path, "names", names, wanted)
-    for name, vector in found.items():
+    for name, vector in vectors.items():
         wrong = np.flatnonzero(~np.isfinite(vector))
         if len(wrong):
             allowed = f"must be a finite number; {len(wrong)} of {len(vector)} are not"
             raise InputError.one(path, f"{name}[{wrong[0]}]", float(vector[wrong[0]]), allowed)
-    return found
+    return vectors
 
 
 def _columns(path: Path) -> dict[str, Vector]:
@@ -161,17 +144,16 @@ def _columns(path: Path) -> dict[str, Vector]:
 
 
 def _named(names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:
-    """The vectors of HEADINGS among them. Raises ValueError."""
-    found = {}
+    """The vectors of HEADINGS that have one of these names. Raises ValueError."""
+    vectors = {}
     for name, headings in HEADINGS.items():
-        known = [each for each in headings if each in names]
-        if len(known) > 1:
-            raise ValueError(f"has {' and '.join(known)}: give one of them alone")
-        if known:
-            array = np.asarray(read(known[0]))
+        there = [heading for heading in headings if heading in names]
+        if len(there) > 1:
+            raise ValueError(f"has {' and '.join(there)}: give one of them alone")
+        if there:
+            array = np.asarray(read(there[0]))
             if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):
-                raise ValueError(
-                    f"{known[0]} is an array of {array.dtype} of shape {array.shape}, not a vector"
-                )
-            found[name] = array.astype(float).ravel()
-    return found
+                what = f"an array of {array.dtype} of shape {array.shape}"
+                raise ValueError(f"{there[0]} is {what}, not a vector")
+            vectors[name] = array.astype(float).ravel()
+    return vectors

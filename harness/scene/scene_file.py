@@ -1,4 +1,4 @@
-"""A scene's file with other values, its comments and order kept, for another folder."""
+"""Writes a scene's file with other values for another folder; its comments and order are kept."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from problems.random_scenes import drawn_table
 from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_toml
 
 MOVED = ("fasteners",)  # what `with_fasteners` changes
-FILES = ("assembly", "file", "superelement", "nodes")  # keys whose values may be paths, as seen from the file
+FILES = ("assembly", "file", "superelement", "nodes")  # keys whose values may be paths, relative to the file
 
 
 def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequence[str]) -> str:
-    """The text of a scene's file, changed, whose other files are found from `folder`. kinds : of the effects
-    that change.
+    """The changed text of a scene's file, with paths relative to `folder`. kinds : the kinds of effects that
+    change.
 
-    Raises InputError if the scene has no file, as a rung of a ladder, or if its assembly's has such effects.
+    Raises InputError if the scene has no file, as a rung of a ladder, or if its assembly has such effects.
     """
     if table := drawn_table(source):
         document, home = tomlkit.parse(tomlkit.dumps(table)), SCENES
@@ -50,14 +50,14 @@ def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], Non
     """The change that moves all fasteners of a scene to these places, mm; none leaves it without."""
 
     def change(document: Any) -> None:
-        found = of_kind(document, "fasteners")
-        if not found:
+        tables = of_kind(document, "fasteners")
+        if not tables:
             raise InputError.one("scene", 'effect kind = "fasteners"', "none", "at least one")
         for key in ("pattern", "file", "columns", "points"):
-            found[0].pop(key, None)
+            tables[0].pop(key, None)
         if points:
-            found[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
-        for other in found[1 if points else 0 :]:
+            tables[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
+        for other in tables[1 if points else 0 :]:
             document["effect"].remove(other)
 
     return change

@@ -51,17 +51,14 @@ def refuse_other_contacts(first: str, second: str) -> None:
     """Raise Incomparable unless both scenes have the same contacts at the same nodes."""
     one, other = read_scene(first), read_scene(second)
     if isinstance(one, JointScene) and isinstance(other, JointScene):
-        contacts = [list(pair) for pair in other.joint.pairs]
-        first_joint, second_joint = one.joint, other.joint
-        same = first_joint.pairs == second_joint.pairs and all(
-            np.array_equal(first_joint.places(pair), second_joint.places(pair)) for pair in first_joint.pairs
-        )
-        if not (same and contacts):
+        places, others = ([joint.places(pair) for pair in joint.pairs] for joint in (one.joint, other.joint))
+        same = one.joint.pairs == other.joint.pairs and all(map(np.array_equal, places, others))
+        if not (same and places):
             allowed = f"the contacts of {first}, at least one, at the same nodes"
-            raise Incomparable.one(second, "contacts", contacts, allowed)
+            raise Incomparable.one(second, "contacts", [list(pair) for pair in other.joint.pairs], allowed)
         return
-    wanted, found = (prepared(scene).assembly.A for scene in (one, other))
-    if wanted.shape != found.shape or (wanted != found).nnz or not wanted.shape[1]:
-        rows, others = (f"A of shape {A.shape} with {A.nnz} entries" for A in (wanted, found))
-        allowed = f"those of {first}, at least one: {rows}, entry by entry"
-        raise Incomparable.one(second, "contacts", others, allowed)
+    A, B = (prepared(scene).assembly.A for scene in (one, other))
+    if A.shape != B.shape or (A != B).nnz or not A.shape[1]:
+        wanted, given = (f"A of shape {M.shape} with {M.nnz} entries" for M in (A, B))
+        allowed = f"those of {first}, at least one: {wanted}, entry by entry"
+        raise Incomparable.one(second, "contacts", given, allowed)

@@ -1,4 +1,7 @@
-"""A solver on one problem, the only code that calls the steps of solvers.base; the in-house ones in turn."""
+"""Takes a solver through its steps on one problem; tries the in-house methods in turn.
+
+No other code calls the steps of solvers.base.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +28,14 @@ from .solver_answer import InvalidAnswer, checked
 
 NO_ANSWER = "gave no answer; try another solver or form"
 NO_CONTACT = "no contact closes"
-#: The methods that a reference may be proven from.
+#: The in-house methods whose answers may become a reference, in the order in which they are tried.
 DENSE = ("newton", "ipm-fast", "ipm", "gi")
 SPARSE = ("newton", "mprgp")
-TOLERANCE_MM = 1e-11  # of these
+TOLERANCE_MM = 1e-11  # of these methods
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedCase:
     """A solved load case, from which the next one may start. case : its number in a series."""
 
     case: int | None
@@ -63,7 +66,7 @@ class SolverSession:
         most: int | None = None,
     ) -> None:
         self.solver, self.problem, self.tolerance, self.reporter = solver, problem, tolerance, reporter
-        self.solved: deque[Solved] = deque(maxlen=most)
+        self.solved: deque[SolvedCase] = deque(maxlen=most)
         self.opened = False
         self.state: Any = None
         self.ready: Any = None
@@ -74,16 +77,16 @@ class SolverSession:
         protect(self.problem)
         with self._step("convert_s"):
             self.units = Units.of(self.problem)
-            given = self.units.scaled()
-            protect(given)
-            converted = self.solver.convert(given)
+            scaled = self.units.scaled()
+            protect(scaled)
+            converted = self.solver.convert(scaled)
         with self._step("prepare_s"):
             self.state = self.solver.prepare(converted)
             if batched and (batch := self.solver.batched(self.state)) is not None:
                 self.batch = self._in_units(batch)
         self.opened = True
 
-    def nearest(self, load: LoadCase) -> Solved | None:
+    def nearest(self, load: LoadCase) -> SolvedCase | None:
         """The solved case to start from; None before the first case and after a failure."""
         if self.ready is None:
             return None
@@ -94,30 +97,30 @@ class SolverSession:
         tolerance = self.tolerance if tolerance is None else tolerance
         self.units = self.units.of_loads([load])
         with self._step("setup_s"):
-            given = self.units.load(load), self.units.tolerance(tolerance)
-            self.ready = self.solver.setup(self.state, *given)
-        return self._solve(*given)
+            scaled = self.units.load(load), self.units.tolerance(tolerance)
+            self.ready = self.solver.setup(self.state, *scaled)
+        return self._solve(*scaled)
 
     def warm(self, load: LoadCase, start: WarmStart) -> Answer:
         """Update for the next load case, and solve."""
         self.units = self.units.followed_by(load)
         with self._step("setup_s"):
-            given = self.units.load(load), self.units.tolerance(self.tolerance)
+            scaled = self.units.load(load), self.units.tolerance(self.tolerance)
             near = WarmStart(self.units.load(start.load), *self.units.start(start.lam, start.gap, start.x))
-            self.ready = self.solver.update(self.state, self.ready, *given, near)
-        return self._solve(*given)
+            self.ready = self.solver.update(self.state, self.ready, *scaled, near)
+        return self._solve(*scaled)
 
-    def next(self, load: LoadCase, near: Solved | None, case: int | None = None) -> Answer:
+    def next(self, load: LoadCase, near: SolvedCase | None, case: int | None = None) -> Answer:
         """Solve, from the nearest answer if there is one; the answer is checked and kept."""
         if near is None:
-            found = self.cold(load)
+            answer = checked(self.cold(load), self.problem)
         else:
             gap = self.problem.gap(near.load, near.lam, near.x)
-            found = self.warm(load, WarmStart(near.load, near.lam, gap, near.x))
-        answer = checked(found, self.problem)
+            start = WarmStart(near.load, near.lam, gap, near.x)
+            answer = checked(self.warm(load, start), self.problem)
         if answer.lam is not None:
             x = answer.x if "x" in self.problem.needs else None
-            self.solved.append(Solved(case, load, answer.lam, x))
+            self.solved.append(SolvedCase(case, load, answer.lam, x))
         return answer
 
     def solve_batch(self, loads: Sequence[LoadCase]) -> list[Answer]:
@@ -130,7 +133,7 @@ class SolverSession:
         return [checked(answer, self.problem) for answer in answers]
 
     def forget(self) -> None:
-        """After a failure: set up the next case from the start."""
+        """Set up the next case from the start, as after a failure."""
         self.ready = None
 
     @contextmanager
@@ -163,7 +166,7 @@ class SolverSession:
 
 
 def _in_own_units(answer: Answer, units: Units) -> Answer:
-    """λ and x in the problem's units; anything but an answer stays, to be refused."""
+    """The answer with λ and x in the problem's units; what is no Answer stays, to be refused."""
     if units.unchanged or not isinstance(answer, Answer):
         return answer
     lam, x = units.answer(answer.lam, answer.x)
@@ -185,7 +188,7 @@ def protect(problem: Problem) -> None:
 
 
 def form_of(name: str, taken: Sequence[Form], form: Form | None = None) -> Form:
-    """The form asked for, else the usual one of those that a solver takes. Raises InputError."""
+    """The form asked for, else the usual one of those taken. Raises InputError if it is not taken."""
     form = form or default_form(taken)
     if form not in taken:
         raise InputError.one(f"solver {name}", "form", form, f"it takes {' and '.join(taken)}")
@@ -208,7 +211,7 @@ def answer_of(
 
 
 def forces_of(name: str, solver: Solver, problem: Problem, case: LoadCase, tolerance: float) -> Answer:
-    """The solver's own answer. Raises InputError if it is invalid, or neither forces nor displacements."""
+    """The solver's own answer. Raises InputError if it is invalid, or has no forces and displacements."""
     session = SolverSession(solver, problem, tolerance)
     session.open()
     (load,) = problem.loads([case])
@@ -222,9 +225,9 @@ def forces_of(name: str, solver: Solver, problem: Problem, case: LoadCase, toler
 
 
 def no_answer(name: str, answer: Answer) -> InputError:
-    """The error of a solver that gives neither forces nor displacements."""
-    said = ": ".join(filter(None, (answer.status, answer.cause)))
-    return InputError.one(f"solver {name}", "status", said, NO_ANSWER)
+    """The error for a solver that gives neither forces nor displacements."""
+    status = ": ".join(filter(None, (answer.status, answer.cause)))
+    return InputError.one(f"solver {name}", "status", status, NO_ANSWER)
 
 
 def candidates(prepared: Prepared, load: LoadCase) -> Iterator[tuple[str, Vector]]:

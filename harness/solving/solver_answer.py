@@ -1,4 +1,4 @@
-"""A solver's answer: whether it is valid, its figures for the row, its file; and what it may not change."""
+"""A solver's answer: whether it is valid, its figures for the row, its file; files that it may not change."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class InvalidAnswer(Exception):
 
 
 def checked(answer: object, problem: Problem) -> Answer:
-    """The answer in plain types; everything that a solver returns passes here. Raises InvalidAnswer."""
+    """The answer in plain types. Raises InvalidAnswer. Everything that a solver returns passes here."""
     plain, faults = examined(answer, problem)
     if faults:
         raise faults[0]
@@ -45,24 +45,24 @@ def checked(answer: object, problem: Problem) -> Answer:
 
 
 def examined(answer: object, problem: Problem) -> tuple[Answer, list[InvalidAnswer]]:
-    """The answer in plain types, None for what is invalid, and all that is wrong with it.
+    """The answer in plain types, with None for each invalid part, and all that is wrong with it.
 
-    lam (m,) and x (n,) become float64 arrays of their own, read-only; iterations integers; details plain
-    JSON, dropped if it is large. Type, status, shapes or values may be wrong, as of a complex λ.
+    lam (m,) and x (n,) become read-only float64 copies, iterations integers, details plain JSON, dropped if
+    it is large.
     """
     if not isinstance(answer, Answer):
         wrong = f"solve returned {type(answer).__name__}, not solvers.base.Answer"
         return Answer("failed", None), [InvalidAnswer(wrong, "Return a solvers.base.Answer")]
     faults: list[InvalidAnswer] = []
 
-    def plain(convert: Callable[..., Any], *given: Any) -> Any:
+    def plain(convert: Callable[..., Any], *arguments: Any) -> Any:
         try:
-            return convert(*given)
+            return convert(*arguments)
         except InvalidAnswer as fault:
             faults.append(fault)
             return None
 
-    found = Answer(
+    converted = Answer(
         plain(_status, answer.status),
         plain(vector, "lam", answer.lam, problem.assembly.m),
         plain(vector, "x", answer.x, problem.assembly.n),
@@ -71,15 +71,13 @@ def examined(answer: object, problem: Problem) -> tuple[Answer, list[InvalidAnsw
         plain(_seconds, "reported_s", answer.reported_s),
         plain(_plain, answer.details),
     )
-    return found, faults
+    return converted, faults
 
 
 def _status(value: Any) -> Any:
     if not isinstance(value, str) or value not in get_args(Status):
-        words = ", ".join(get_args(Status))
-        raise InvalidAnswer(
-            f"status {shown(value)}; allowed: {words}", "Say how it ended in one of these words"
-        )
+        wrong = f"status {shown(value)}; allowed: {', '.join(get_args(Status))}"
+        raise InvalidAnswer(wrong, "Say how it ended in one of these words")
     return value
 
 
@@ -92,15 +90,15 @@ def vector(name: str, value: Any, size: int) -> Vector | None:
         return None
     fix = f"Return {name} as a numpy array of float64; without an answer, None and a status that says so"
     try:
-        given = np.asarray(value)
+        array = np.asarray(value)
     except Exception as error:
         raise InvalidAnswer(f"{name} is no array: {error_text(error)}", fix) from error
-    if given.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
-        raise InvalidAnswer(f"{name} is {type(value).__name__} of {given.dtype}; wanted real numbers", fix)
-    if given.shape != (size,):
-        raise InvalidAnswer(f"{name} has shape {given.shape}; wanted ({size},)", fix)
+    if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
+        raise InvalidAnswer(f"{name} is {type(value).__name__} of {array.dtype}; wanted real numbers", fix)
+    if array.shape != (size,):
+        raise InvalidAnswer(f"{name} has shape {array.shape}; wanted ({size},)", fix)
     with np.errstate(over="ignore"):
-        plain = np.array(given, dtype=np.float64)
+        plain = np.array(array, dtype=np.float64)
     if not np.isfinite(plain).all():
         raise InvalidAnswer(f"{name} has NaN or infinity", fix)
     plain.flags.writeable = False
@@ -165,7 +163,7 @@ def _bounded(digits: str) -> int:
 
 
 def figures(answer: Answer) -> Report:
-    """What the solver reports, for the row."""
+    """The fields of the row that the solver reports."""
     return {
         "iterations": answer.iterations,
         "inner_iterations": answer.inner_iterations,
@@ -176,31 +174,30 @@ def figures(answer: Answer) -> Report:
 
 
 def save(path: Path, x: Vector, lam: Vector | None, m: int) -> None:
-    """x (n,) in mm and lam (m,) in N, NaN if the solver gives none; written atomically."""
+    """Write x (n,) in mm and lam (m,) in N, NaN if the solver gives none; atomically."""
     replace_arrays(path, {"x": x, "lam": np.full(m, np.nan) if lam is None else lam})
 
 
 class StoredFiles:
-    """The files of the cache entries that memory-mapped arrays come from, as they are now."""
+    """The files of memory-mapped arrays, as they are now."""
 
     def __init__(self, arrays: Iterable[Matrix]) -> None:
-        names = [array.filename for array in arrays if isinstance(array, np.memmap) and array.filename]
-        self.folders = sorted({Path(name).parent for name in names})
-        self.before = {folder: _state(folder) for folder in self.folders}
+        self.files = {
+            Path(array.filename) for array in arrays if isinstance(array, np.memmap) and array.filename
+        }
+        self.states = {path: _state(path) for path in self.files}
 
     def check(self) -> None:
         """Raises InvalidAnswer if a file was written, replaced or deleted since."""
-        changed = [str(folder) for folder, before in self.before.items() if _state(folder) != before]
+        changed = sorted({str(path.parent) for path in self.files if _state(path) != self.states[path]})
         if changed:
             raise InvalidAnswer(f"the solver wrote into the cache: delete {', '.join(changed)}")
 
 
-def _state(folder: Path) -> dict[str, tuple[int, ...]]:
-    """Of each file what a write changes. ctime : no program can set it back."""
+def _state(path: Path) -> tuple[int, ...]:
+    """What writing changes of a file. ctime : no program can set it back."""
     try:
-        found = {path.name: path.stat() for path in folder.iterdir()}
+        stat = path.stat()
     except OSError:
-        return {}
-    return {
-        name: (stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns) for name, stat in found.items()
-    }
+        return ()
+    return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns

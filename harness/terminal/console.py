@@ -169,7 +169,7 @@ def row_text(row: Row) -> Text:
 class Display(Reporter):
     """Rows scroll above a progress bar; without a terminal only the rows are printed."""
 
-    def __init__(self, console: Console, left: int, done: int) -> None:
+    def __init__(self, console: Console, remaining: int, done: int) -> None:
         self.console = console
         self.bar = Progress(
             TextColumn("{task.description}", markup=False),
@@ -180,7 +180,7 @@ class Display(Reporter):
             console=console,
             disable=not console.is_terminal,
         )
-        self.task: TaskID = self.bar.add_task("", total=left + done, completed=done)
+        self.task: TaskID = self.bar.add_task("", total=remaining + done, completed=done)
         self.heading = ""
 
     def __enter__(self) -> Display:

@@ -10,7 +10,7 @@ import pytest
 from harness.conformance.check import run
 from harness.conformance.known_problems import known_problems
 from problems.forms.assembly import LoadCase
-from solvers.base import Answer, Form, Problem, Solver, WarmStart
+from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 from solvers.registry import make_solver
 
 
@@ -44,7 +44,7 @@ def spoiling(change: Callable[[Answer], Any]) -> type[Sound]:
     return Spoilt
 
 
-def words_of(solver: type[Solver], forms: tuple[Form, ...] | None = None) -> str:
+def words_of(solver: type[Solver], forms: tuple[Form, ...] = FORMS) -> str:
     return "\n".join(map(str, run(solver, forms)))
 
 
