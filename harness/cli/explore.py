@@ -40,21 +40,14 @@ def explore(
             allowed = f"needs Bokeh: pip install 'rivetbench[explore]' ({error})"
             raise InputError.one("explore", "bokeh", "not installed", allowed) from error
 
-        from harness.explore.live_answers import Explorer, Settings
-        from harness.planning.form_choice import chosen_form
+        from harness.explore.live_answers import Explorer
         from harness.scene.allowed_gap import refuse_unusable
         from harness.terminal.console import ConsoleReporter
-        from problems.forms import FORMS
-        from problems.model.scene import JointScene
-        from problems.scene_files import read_scene
 
         refuse_unusable(allow_gap)
-        read = read_scene(scene)
-        settings = Settings.of(read)
-        assert isinstance(read, JointScene)
         with ConsoleReporter(console).step("matrices, and the first answer"):
-            explorer = Explorer(read, chosen_form(read, FORMS, None).form)
-            first = explorer.answer(settings)
+            explorer = Explorer(scene)
+            first = explorer.answer(explorer.settings)
 
         def ready(address: str) -> None:
             console.print(f"{address}  (Ctrl-C ends it)")

@@ -95,8 +95,7 @@ def series(
                 3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with error_reporting() as console:
-        from harness.commands.load_case_series import SeriesOptions
-        from harness.commands.load_case_series import series as solve_into
+        from harness.commands.load_case_series import SeriesOptions, run_series
         from harness.series.load_case_source import GapCases
         from harness.terminal.console import ConsoleReporter, show_verdict
 
@@ -104,7 +103,7 @@ def series(
         read_by = table_options(columns, missing)
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         taken: Any = form.value if form else None
-        outcome = solve_into(
+        outcome = run_series(
             scene,
             out,
             GapCases(cases, seed, mean, sd, correlation_length, around, gaps, read_by),

@@ -160,7 +160,20 @@ def gate(
       5  the baseline has none of these measurements, other problems or other limits
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
-        from harness.verification.gate import gate as judge_directory
+        from harness.verification.gate import gate as judge_again
+        from harness.verification.gate import table
 
-        code = judge_directory(directory, console, reference_limit, baseline, margin, json, junit)
-        raise typer.Exit(code)
+        outcome = judge_again(
+            directory,
+            reference_limit_s=reference_limit,
+            baseline=baseline,
+            margin=margin,
+            json_file=json,
+            junit_file=junit,
+        )
+        first, *others = outcome.sentences
+        console.print(table(outcome.findings))
+        console.print(first, style="green" if outcome.passed else "red")
+        for sentence in others:
+            console.print(sentence)
+        raise typer.Exit(outcome.code)

@@ -107,7 +107,7 @@ class SeriesOutcome:
         return list(series_file.rows(self.directory))
 
 
-def series(
+def run_series(
     scene: str | Path,
     out: str | Path,
     cases: GapCases = DEFAULT,
@@ -151,8 +151,8 @@ def series(
 
     Examples
     --------
-    >>> from rivetbench import GapCases, series
-    >>> done = series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
+    >>> from rivetbench import run_series
+    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
     >>> [row["verdict"] for row in done.rows]
     ['within', 'within']
     """

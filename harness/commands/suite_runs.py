@@ -114,7 +114,7 @@ def report(directory: str | Path) -> Path:
     Parameters
     ----------
     directory : str or Path
-        A directory that `run` or `series` wrote.
+        A directory that `run` or `run_series` wrote.
 
     Returns
     -------
@@ -128,8 +128,8 @@ def report(directory: str | Path) -> Path:
 
     Examples
     --------
-    >>> from rivetbench import report, series
-    >>> done = series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
+    >>> from rivetbench import report, run_series
+    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
     >>> report("results/stack").name
     'report.md'
     """

@@ -1,6 +1,6 @@
 """Answers a scene while its loads and gaps change: matrices are made once, each answer starts from the last.
 
-Settings change the scene's effects: the places and preload of its fasteners, the pressures, the mean of the
+The settings change effects of the scene: places and preload of its fasteners, the pressures, the mean of the
 initial gap. The forces and gaps of an effect are kept as long as it stays the same.
 """
 
@@ -14,7 +14,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.placement.candidates import movable_fasteners
+from harness.planning.form_choice import chosen_form
 from harness.scene.scene_file import MOVED, of_kind, with_fasteners
+from harness.scene.solution import Source, load_scene
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
@@ -23,7 +25,7 @@ from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
-from problems.forms import Form
+from problems.forms import FORMS, Form
 from problems.forms.assembly import DualLoadCase, LoadCase, Vector
 from problems.input.bounded_types import validation_faults
 from problems.model.effect import Effect, StiffnessEffect
@@ -38,8 +40,18 @@ PAGE = "page"  # where a wrong value was given
 
 @dataclass(frozen=True)
 class Settings:
-    """Places of the fasteners, mm, and preload, N; means of the initial gaps, mm, and pressures, N/mm²; in
-    the order of the scene.
+    """What may change of a scene while it is explored.
+
+    Parameters
+    ----------
+    places : tuple of (float, float)
+        Places (x, y) of the fasteners, mm.
+    preload : float
+        Preload of each fastener, N.
+    means : tuple of float
+        Means of the scene's initial gaps, in their order, mm.
+    pressures : tuple of float
+        The scene's pressures, in their order, N/mm².
     """
 
     places: tuple[tuple[float, float], ...]
@@ -49,12 +61,12 @@ class Settings:
 
     @classmethod
     def of(cls, scene: Scene) -> Settings:
-        """Raises InputError if the scene has no fasteners that can move."""
+        """The settings of a scene. Raises InputError if it has no fasteners that can move."""
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
         marks = np.concatenate([effect.marks(scene.joint) for effect in fasteners])
-        means = tuple(gap.mean for gap in scene.effects_of(InitialGap))
-        pressures = tuple(pressure.value for pressure in scene.effects_of(Pressure))
+        means = tuple(effect.mean for effect in scene.effects_of(InitialGap))
+        pressures = tuple(effect.value for effect in scene.effects_of(Pressure))
         places = tuple((x, y) for x, y in marks.tolist())
         return cls(places, fasteners[0].preload, means, pressures)
 
@@ -96,8 +108,22 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """The answer to some settings: λ (m,) N, gap (m,) mm. error_mm : of any gap; None until it is proven."""
+class LiveAnswer:
+    """An answer to some settings of a scene.
+
+    Parameters
+    ----------
+    settings : Settings
+        What it answers.
+    load : DualLoadCase
+        Their forces f, gaps g and overlap p.
+    lam : array (m,), N
+        Contact forces.
+    gap : array (m,), mm
+        Remaining gaps.
+    error_mm : float, optional
+        Proven bound on the error of every gap, mm; None while nothing is proven.
+    """
 
     settings: Settings
     load: DualLoadCase
@@ -107,32 +133,86 @@ class Answer:
 
 
 class Explorer:
-    """Answers settings on the matrices of a scene, which are made once."""
+    """Answers while the fasteners, preload, gaps and pressures of a scene change; its matrices are made once.
 
-    def __init__(self, scene: JointScene, form: Form) -> None:
-        self.scene, self.form = scene, form
-        self.data = prepared(scene, form=form)
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        A joint with fasteners that can move: the scene, its name, the path of its file, or its content.
+    form : str, optional
+        "dual" or "sparse"; by default the cheaper one.
+
+    Raises
+    ------
+    InputError
+        If the scene is wrong, or has no fasteners that can move.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from rivetbench import Explorer
+    >>> explorer = Explorer("examples/three-fasteners.toml")
+    >>> answer = explorer.answer(replace(explorer.settings, preload=2000.0))
+    >>> explorer.proven(answer).error_mm < 1e-7
+    True
+    """
+
+    def __init__(self, scene: Source, form: Form | None = None) -> None:
+        joint_scene = load_scene(scene)
+        self.settings = Settings.of(joint_scene)
+        assert isinstance(joint_scene, JointScene)
+        self.scene, self.form = joint_scene, form or chosen_form(joint_scene, FORMS, None).form
+        self.data = prepared(self.scene, form=self.form)
         self.sweeps = Sweeps(self.data)
         self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
         self.contribution = lru_cache(maxsize=256)(self._contribution)
 
-    def answer(self, settings: Settings, near: Answer | None = None) -> Answer:
-        """The answer to settings, started from `near`. Raises InputError if a setting is wrong."""
+    def answer(self, settings: Settings, near: LiveAnswer | None = None) -> LiveAnswer:
+        """Solve the scene with other settings, to about 1e-5 mm.
+
+        Parameters
+        ----------
+        settings : Settings
+            In mm, N and N/mm².
+        near : LiveAnswer, optional
+            An earlier answer to start from.
+
+        Returns
+        -------
+        LiveAnswer
+            Contact forces and gaps, not proven yet.
+
+        Raises
+        ------
+        InputError
+            If a setting is wrong.
+        """
         effects = settings.applied(self.scene)
-        parts = [self.contribution(one) for one in effects if not isinstance(one, StiffnessEffect)]
+        parts = [self.contribution(effect) for effect in effects if not isinstance(effect, StiffnessEffect)]
         none = self.contribution(None)
         f, g = sum((f for f, _ in parts), none[0]), sum((g for _, g in parts), none[1])
         (load,) = self.data.with_p([LoadCase(f, g)])
         return self._solved(settings, load, TOLERANCE_MM, near)
 
     def _solved(
-        self, settings: Settings, load: DualLoadCase, tolerance: float, near: Answer | None
-    ) -> Answer:
+        self, settings: Settings, load: DualLoadCase, tolerance: float, near: LiveAnswer | None
+    ) -> LiveAnswer:
         start = None if near is None else DualStart(near.load, near.lam, near.gap)
-        return Answer(settings, load, *self.sweeps.vectors(self.sweeps.solved(load, tolerance, start)))
+        return LiveAnswer(settings, load, *self.sweeps.vectors(self.sweeps.solved(load, tolerance, start)))
 
-    def proven(self, answer: Answer) -> Answer:
-        """The answer solved to more digits, with proven gaps and their error."""
+    def proven(self, answer: LiveAnswer) -> LiveAnswer:
+        """Refine an answer, and prove how far its gaps may be off.
+
+        Parameters
+        ----------
+        answer : LiveAnswer
+            From `answer`.
+
+        Returns
+        -------
+        LiveAnswer
+            The gaps, mm, to more digits, with `error_mm`.
+        """
         answer = self._solved(answer.settings, answer.load, PROVEN_MM, answer)
         (assessed,) = assess(self.proof, [answer.load], [answer.lam], [None], LIMIT_MM / 2)
         error = self.gap_error(answer.load.g, assessed.x, assessed.bound_mm)

@@ -24,7 +24,7 @@ from bokeh.models.tools import PointDrawTool
 from bokeh.plotting import figure
 from bokeh.server.server import Server
 
-from harness.explore.live_answers import CHANGED, Answer, Explorer, Settings
+from harness.explore.live_answers import CHANGED, Explorer, LiveAnswer, Settings
 from harness.explore.raster import Raster
 from harness.results.records import replace_text
 from harness.scene.scene_file import edited
@@ -49,7 +49,7 @@ class Page:
     """One tab."""
 
     def __init__(
-        self, explorer: Explorer, source: str, limit_mm: float, first: Answer, document: Any
+        self, explorer: Explorer, source: str, limit_mm: float, first: LiveAnswer, document: Any
     ) -> None:
         self.explorer, self.source, self.document = explorer, source, document
         self.answer, self.first, self.pending = first, first.settings, None
@@ -141,7 +141,7 @@ class Page:
         return place if place in self.first.places else (round(x, DIGITS), round(y, DIGITS))
 
     def changed(self, attr: str, old: object, new: object) -> None:
-        """Answer the settings that the page shows, or say what is wrong with them."""
+        """LiveAnswer what the page asks for, or say what is wrong with it."""
         self.colours.high = float(self.sliders["limit"].value)
         try:
             if self.settings != self.answer.settings:
@@ -200,7 +200,7 @@ class Page:
         self.fault.text = f"Saved. <code>{escape(command)}</code>"
 
 
-def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
+def outcome(answer: LiveAnswer, places: Matrix, limit_mm: float) -> str:
     """PASS or FAIL, the largest gap with its place, and how sure that is."""
     k = int(answer.gap.argmax())
     gap, place = float(answer.gap[k]), position(places[k], places)
@@ -219,7 +219,7 @@ def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
 
 
 def serve(
-    explorer: Explorer, source: str, limit_mm: float, first: Answer, ready: Callable[[str], None]
+    explorer: Explorer, source: str, limit_mm: float, first: LiveAnswer, ready: Callable[[str], None]
 ) -> None:
     """Serve pages to this machine alone, under an address that nobody can guess, until interrupted."""
     token = secrets.token_urlsafe(16)

@@ -31,15 +31,38 @@ Source = Scene | str | Path | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Solution:
-    """An answer to a scene.
+    """An answer to a scene, judged.
 
-    lam : (m,) contact forces, N; NaN if the solver gives none. gap : (m,) the remaining gaps, g − Aᵀx, mm.
-    status, iterations : reported by the solver; the reference has no iterations.
-    judgement : the judge's figures. error_bound_mm : proven, max|x − x*| for the exact answer x*.
-    notes : sentences on numbers of the user that reading has rounded or symmetrised.
-    method : the name of the solver, or how the reference was proven. from_reference : whether the answer is
-    the reference. unknowns : (N,) mm, all of the form. closest_mm : the smallest gap if contact is ignored;
-    None without contacts. seconds : of each step. choice : of the form.
+    Parameters
+    ----------
+    lam : array (m,), N
+        Contact forces; NaN if the solver gives none.
+    gap : array (m,), mm
+        Remaining gaps, g − Aᵀx.
+    status : str
+        Reported by the solver.
+    iterations : int, optional
+        Reported by the solver; None for the reference.
+    judgement : Judgement
+        The judge's figures.
+    error_bound_mm : float
+        Proven bound on max|x − x*|, mm, for the exact answer x*.
+    notes : tuple of str
+        Sentences on numbers of the user that reading has rounded or symmetrised.
+    method : str
+        The name of the solver, or how the reference was proven.
+    from_reference : bool
+        Whether the answer is the reference.
+    unknowns : array (N,), mm
+        All unknowns of the form.
+    closest_mm : float, optional
+        The smallest gap if contact is ignored, mm; None without contacts.
+    seconds : dict of str to float
+        Seconds of each step.
+    choice : Choice
+        The form, and why it was chosen.
+    problem : ReferenceProblem
+        The matrices, loads and reference.
     """
 
     lam: Vector
@@ -59,7 +82,7 @@ class Solution:
 
     @property
     def x(self) -> Vector:
-        """(n,) displacements, mm."""
+        """Displacements (n,), mm."""
         return self.problem.prepared.assembly.at_junction(self.unknowns)
 
     @property
@@ -69,10 +92,30 @@ class Solution:
 
 
 def load_scene(source: Source) -> Scene:
-    """A checked scene by name, path or content; nothing is computed.
+    """Read and check a scene; nothing is computed.
 
-    In a dict, `joint` and the entries of `effect` may be tables or objects (problems.model.joint.Joint,
-    problems.effects); paths are relative to the working directory.
+    Parameters
+    ----------
+    source : str, Path, dict or Scene
+        The name of a scene, the path of its file, or the content of its file. In a dict, `joint` and the
+        entries of `effect` may be tables or objects (problems.model.joint.Joint, problems.effects); paths are
+        relative to the working directory. Lengths are in mm, forces in N.
+
+    Returns
+    -------
+    Scene
+        For all functions that take a scene.
+
+    Raises
+    ------
+    InputError
+        With all faults of the scene.
+
+    Examples
+    --------
+    >>> from rivetbench import load_scene
+    >>> load_scene("gallery/three-part-stack").expected_size
+    (1107, 738)
     """
     if isinstance(source, Scene):
         return source
@@ -91,13 +134,44 @@ def solve(
 ) -> Solution:
     """Solve a scene, and judge the answer.
 
-    solver : a name (`python -m harness list solvers`) or an object of your own; by default the proven
-        reference, as also where the answer without contact violates no gap and so no solver is called for.
-    form : "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
-    tolerance : passed to the solver, with its options. limit_s : after it no further candidate for the
-        reference is tried. reporter : is told the steps, and what to know before the answer is there.
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        The scene, its name, the path of its file, or the content of its file.
+    solver : str or Solver, optional
+        A solver by name or an object of your own; by default the proven reference. No solver is called if
+        the answer without contact violates no gap.
+    options : dict, optional
+        Options of a solver by name.
+    form : str, optional
+        "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
+    tolerance : float, optional
+        Passed to the solver.
+    limit_s : float, optional
+        After this time, s, no further candidate for the reference is tried.
+    reporter : Reporter, optional
+        Is told the steps, and what to know before the answer is there; silent by default.
 
-    Raises InputError.
+    Returns
+    -------
+    Solution
+        Displacements x in mm, contact forces lam in N, gaps in mm, and a proven bound on the error.
+
+    Raises
+    ------
+    InputError
+        If the scene is wrong, or the solver gives no valid answer.
+
+    Notes
+    -----
+    The problem is min ½xᵀKx − fᵀx subject to Aᵀx ≤ g. Its answer is x* = K⁻¹(f − Aλ*), λ* ≥ 0.
+
+    Examples
+    --------
+    >>> from rivetbench import solve
+    >>> answer = solve("gallery/three-part-stack")
+    >>> print(f"{answer.gap.max():.3f} mm, {answer.judgement.verdict}")
+    0.668 mm, within
     """
     scene, seconds = load_scene(scene), {}
 

@@ -5,11 +5,11 @@ data and the reference are made from the scene.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 
 from pydantic import ValidationError
-from rich.console import Console
 from rich.table import Table
 
 from harness.planning.plan import expand
@@ -38,63 +38,114 @@ UNREADABLE = "is missing, damaged or not finite"
 MEASURED = ("*.jsonl", "*.toml", "machine*.json", "answers/*")
 
 
-def gate(
-    directory: Path,
-    console: Console,
-    reference_limit_s: float | None = None,
-    baseline: Path | None = None,
-    margin: float = MARGIN,
-    json_file: Path | None = None,
-    junit_file: Path | None = None,
-) -> int:
-    """Judge every gated row of DIRECTORY. Raises InputError; Incomparable if the baseline is another suite's.
+@dataclass(frozen=True)
+class GateOutcome:
+    """The outcome of a gate.
 
-    baseline : the directory of an earlier run, whose errors may be exceeded by the factor `margin` at most.
-    Returns 0 if all gated rows are within 1e-7 mm (on a rung of a ladder, what conditioning allows), 1 if
-    not (a row is outside, has no answer, is missing, cannot be judged, or is worse than the baseline), 3 if
-    no answer at all could be judged, or compared with the baseline.
+    Parameters
+    ----------
+    findings : list of Finding
+        One per gated row: its key, its judgement, its limit_mm, and why it has not passed.
+    code : int
+        Exit code of the command: 0 passed, 1 accuracy lost, 3 nothing could be judged.
+    sentences : tuple of str
+        The outcome in words.
     """
-    if not directory.is_dir():
-        raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
-    sides = [directory] if baseline is None else [directory, baseline]
+
+    findings: list[Finding]
+    code: int
+    sentences: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every gated row is accurate enough."""
+        return self.code == DONE
+
+
+def gate(
+    directory: str | Path,
+    *,
+    reference_limit_s: float | None = None,
+    baseline: str | Path | None = None,
+    margin: float = MARGIN,
+    json_file: str | Path | None = None,
+    junit_file: str | Path | None = None,
+) -> GateOutcome:
+    """Judge every gated answer of a run again: is it accurate enough?
+
+    Parameters
+    ----------
+    directory : str or Path
+        A directory that `run` wrote.
+    reference_limit_s : float, optional
+        Limit on the search for each reference, s.
+    baseline : str or Path, optional
+        The directory of an earlier run, whose errors may be exceeded by the margin at most.
+    margin : float, optional
+        The allowed factor over the baseline.
+    json_file, junit_file : str or Path, optional
+        Files for the findings: JSON, and JUnit XML.
+
+    Returns
+    -------
+    GateOutcome
+        The findings. The gate passes if every gated row is within 1e-7 mm; on a rung of a ladder, within what
+        conditioning allows.
+
+    Raises
+    ------
+    InputError
+        If the directory has no rows, or damaged ones.
+    Incomparable
+        If the baseline is of another suite.
+
+    Examples
+    --------
+    >>> from rivetbench import Overrides, gate, run
+    >>> change = Overrides(scenes=("gallery/three-part-stack",), solvers=("gi",), forms=("dual",))
+    >>> outcome = run("gate", "results/gi", change)
+    >>> gate("results/gi").sentences
+    ('Passed: all 1 gated rows are within 1e-07 mm.',)
+    """
+    folder, base = Path(directory), Path(baseline) if baseline else None
+    if not folder.is_dir():
+        raise InputError.one("DIR", "directory", str(folder), "no such directory; `run` makes one")
+    sides = [folder] if base is None else [folder, base]
     inputs = [path for side in sides for files in MEASURED for path in side.glob(files)]
-    outputs = {"--json": json_file, "--junit": junit_file}
+    named = {"--json": json_file, "--junit": junit_file}
+    outputs = {option: Path(file) if file else None for option, file in named.items()}
     refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])
-    rows = gated_rows(directory / records.MEASUREMENTS)
+    rows = gated_rows(folder / records.MEASUREMENTS)
     refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
-    standard = read_baseline(baseline, margin, str(directory), rows.values()) if baseline else None
-    findings = [*judged(rows, directory, reference_limit_s, standard), *never_measured(rows, directory)]
-    console.print(table(findings))
-    code = concluded(findings, standard, console)
+    standard = read_baseline(base, margin, str(folder), rows.values()) if base else None
+    findings = [*judged(rows, folder, reference_limit_s, standard), *never_measured(rows, folder)]
+    code, sentences = concluded(findings, standard)
     if json_file:
-        write_json(json_file, directory, findings, code)
+        write_json(Path(json_file), folder, findings, code)
     if junit_file:
-        write_junit(junit_file, findings)
-    return code
+        write_junit(Path(junit_file), findings)
+    return GateOutcome(findings, code, sentences)
 
 
-def concluded(findings: list[Finding], baseline: Baseline | None, console: Console) -> int:
-    """Print the outcome; returns the exit code."""
+def concluded(findings: list[Finding], baseline: Baseline | None) -> tuple[int, tuple[str, ...]]:
+    """The exit code, and the outcome in sentences."""
     verdicts = [finding.judgement.verdict for finding in findings]
     if not {"within", "outside"} & set(verdicts):
-        console.print("Nothing could be judged: no gated row has an answer that can be.", style="red")
-        return NOTHING_JUDGED
+        return NOTHING_JUDGED, ("Nothing could be judged: no gated row has an answer that can be.",)
     failed = sum(not finding.passed for finding in findings)
     if failed:
-        console.print(f"Accuracy lost: {failed} of {len(findings)} gated rows.", style="red")
-        return FAILED
+        return FAILED, (f"Accuracy lost: {failed} of {len(findings)} gated rows.",)
     compared = sum(finding.baseline_mm is not None for finding in findings)
     if baseline and not compared:
         why = f"no gated row has an error within its limit in {baseline.name}"
-        console.print(f"Nothing could be compared: {why}.", style="red")
-        return NOTHING_JUDGED
+        return NOTHING_JUDGED, (f"Nothing could be compared: {why}.",)
     wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
-    console.print(f"Passed: all {len(findings)} gated rows are within {limits}.", style="green")
-    if baseline:
-        times = f"none exceeds its error there {baseline.margin:g} times"
-        console.print(f"{compared} of them are in {baseline.name}: {times}.")
-    return DONE
+    passed = f"Passed: all {len(findings)} gated rows are within {limits}."
+    if not baseline:
+        return DONE, (passed,)
+    times = f"none exceeds its error there {baseline.margin:g} times"
+    return DONE, (passed, f"{compared} of them are in {baseline.name}: {times}.")
 
 
 def gated_rows(path: Path) -> dict[str, Row]:

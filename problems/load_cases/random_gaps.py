@@ -83,15 +83,44 @@ def random_gaps(
     around: Path | str | None = None,
     options: TableOptions = AS_NAMED,
 ) -> RandomGaps:
-    """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) override its values.
-    Around a measured gap the mean is 0 by default.
-    around : a CSV of a scan, with columns x, y and gap in mm, that the gaps pass through (scan.py); its mean
-        is theirs by default.
-    options : how that CSV is read.
-    form : what will be solved; f has an entry per unknown of its K.
+    """Make load cases with random gaps around the scene's `initial_gap`.
 
-    Raises InputError if one of them is given by neither, or if the scene has no joint or more than one
-    `initial_gap`.
+    Parameters
+    ----------
+    scene : Scene
+        A joint with at most one `initial_gap`.
+    cases : int
+        How many.
+    seed : int
+        Case k depends on the seed and k alone.
+    mean, sd, correlation_length : float, optional
+        Of the random field, mm; by default those of the scene. Around a measured gap the mean is 0 by
+        default, through a scan it is the mean of the scan.
+    form : str, optional
+        The form that will be solved: f has an entry per unknown of its K.
+    around : Path, optional
+        A CSV of a scan, with columns x, y and gap in mm, that the gaps pass through.
+    options : TableOptions, optional
+        How that CSV is read.
+
+    Returns
+    -------
+    RandomGaps
+        The load cases: f (n,) in N, g (m,) in mm.
+
+    Raises
+    ------
+    InputError
+        If the mean, sd or correlation length is given neither here nor in the scene, or the scene has no
+        joint, or more than one `initial_gap`.
+
+    Examples
+    --------
+    >>> from rivetbench import load_scene, random_gaps
+    >>> scene = load_scene("gallery/three-part-stack")
+    >>> cases = random_gaps(scene, 100, seed=1, sd=0.1, correlation_length=100.0)
+    >>> cases.load(0).g.shape
+    (738,)
     """
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):

@@ -1,0 +1,287 @@
+"""Problems and answers as arrays: your own matrices, an x judged, one dual problem, a series in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+from numpy.typing import ArrayLike
+
+from harness.planning.form_choice import chosen_form
+from harness.scene.solution import Source, load_scene, solver_named
+from harness.series.session import Job, Result, SeriesSession
+from harness.solving.call_lock import in_turn
+from harness.solving.session import forces_of, form_of
+from harness.verification.judge import LIMIT_MM, Judgement
+from harness.verification.reference_problem import opened
+from problems.errors import InputError
+from problems.forms import FORMS, Form
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import dual_alone
+from problems.forms.problem import in_form
+from problems.input.matrix_entries import SYMMETRY, contradictions
+from problems.input.user_matrices import SMALL, checked
+from problems.load_cases import Listed, LoadCases
+from problems.model.scene import ManufacturedProblem, ManufacturedScene, Scene
+from solvers.base import Answer, Solver
+
+NOT_FINITE = "NaN or infinity"
+
+
+def own_matrices(
+    K: Any, A: Any, f: ArrayLike, g: ArrayLike, nodes: ArrayLike | None = None, title: str = "own matrices"
+) -> Scene:
+    """Make a scene of matrices of your own, dense or sparse.
+
+    Parameters
+    ----------
+    K : array or sparse array (n, n), N/mm
+        Stiffness matrix, symmetric positive definite.
+    A : array or sparse array (n, m)
+        Column j is the normal of contact j.
+    f : array (n,), N
+        Nodal forces.
+    g : array (m,), mm
+        Initial gaps.
+    nodes : array (n, 2), mm, optional
+        Positions of the unknowns, by which `newton` numbers the contacts.
+    title : str, optional
+        Title of the scene.
+
+    Returns
+    -------
+    Scene
+        For `solve`, `judge` and `solve_series`.
+
+    Raises
+    ------
+    InputError
+        If shapes or values are wrong, or K is not symmetric and positive definite.
+
+    Examples
+    --------
+    A spring of 100 N/mm, pressed by 50 N against a stop 0.2 mm away:
+
+    >>> from rivetbench import own_matrices, solve
+    >>> answer = solve(own_matrices([[100.0]], [[1.0]], [50.0], [0.2]))
+    >>> print(f"{answer.x[0]:.3f} mm, {answer.lam[0]:.3f} N")
+    0.200 mm, 30.000 N
+    """
+    vectors = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
+    arrays = {name: M if sp.issparse(M) else np.asarray(M) for name, M in (("K", K), ("A", A))}
+    arrays |= {name: np.array(value) for name, value in vectors.items()}
+    sparse = sp.issparse(K) and K.shape[0] > SMALL
+    assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
+    return ManufacturedScene.of(title, ManufacturedProblem(assembly, load), title)
+
+
+def judge(
+    scene: Source,
+    x: ArrayLike,
+    lam: ArrayLike | None = None,
+    limit_mm: float = LIMIT_MM,
+    form: Form = "primal",
+) -> Judgement:
+    """Judge an answer that came from elsewhere, against the certified reference of the scene.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        The scene, its name, the path of its file, or the content of its file.
+    x : array (n,), mm
+        Displacements; in the sparse form all unknowns of the model.
+    lam : array (m,), N, optional
+        Contact forces.
+    limit_mm : float, optional
+        Limit on max|x − x*|, mm.
+    form : str, optional
+        "primal", "dual" or "sparse"; in the sparse form nothing dense is made.
+
+    Returns
+    -------
+    Judgement
+        The verdict and its figures.
+
+    Raises
+    ------
+    InputError
+        If the scene is wrong, or a vector has another length or is not finite.
+
+    Examples
+    --------
+    >>> from rivetbench import judge, own_matrices
+    >>> judge(own_matrices([[100.0]], [[1.0]], [50.0], [0.2]), [0.2001]).verdict
+    'outside'
+    """
+    scene = load_scene(scene)
+    problem = opened(scene, chosen_form(scene, FORMS, form).form)
+    n, m = problem.prepared.assembly.n, problem.prepared.assembly.m
+    x = _vector("judge", "x", x, n)
+    forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)
+    return problem.judged(x, forces, limit_mm)
+
+
+def solve_dual(
+    Q: ArrayLike,
+    p: ArrayLike,
+    solver: str | Solver = "newton",
+    *,
+    options: Mapping[str, Any] | None = None,
+    tolerance: float = 1e-9,
+) -> Answer:
+    """Solve min ½λᵀQλ − pᵀλ, λ ≥ 0, on plain arrays; the answer is the solver's own, not judged.
+
+    Parameters
+    ----------
+    Q : array (m, m), mm/N
+        Symmetric positive definite.
+    p : array (m,), mm
+        Overlap without contact forces; any units that fit to those of Q.
+    solver : str or Solver, optional
+        A solver by name, or an object of your own.
+    options : dict, optional
+        Options of a solver by name.
+    tolerance : float, optional
+        Passed to the solver.
+
+    Returns
+    -------
+    Answer
+        Its `lam` (m,) in N, `status` and `iterations`.
+
+    Raises
+    ------
+    InputError
+        If Q or p is wrong, or the solver gives no valid answer.
+
+    Examples
+    --------
+    >>> from rivetbench import solve_dual
+    >>> solve_dual([[2.0, 0.0], [0.0, 1.0]], [4.0, -1.0], "gi").lam.tolist()
+    [2.0, 0.0]
+    """
+    Q = np.array(Q, dtype=float, order="F")
+    if Q.ndim != 2 or Q.shape[0] != Q.shape[1]:
+        raise InputError.one("solve_dual", "Q.shape", Q.shape, "must be a square matrix")
+    if not np.isfinite(Q).all():
+        raise InputError.one("solve_dual", "Q", NOT_FINITE, "every entry must be finite")
+    p = _vector("solve_dual", "p", p, len(Q))
+    for i, j in contradictions(sp.csr_array(Q))[:1]:
+        key, allowed = f"Q[{i}, {j}] and Q[{j}, {i}]", f"must be symmetric, within {SYMMETRY:g} √(Q_ii Q_jj)"
+        raise InputError.one("solve_dual", key, [Q[i, j].item(), Q[j, i].item()], allowed)
+    try:
+        sla.cholesky(Q)
+    except np.linalg.LinAlgError as error:
+        raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
+    name, chosen = solver_named(solver, options)
+    form = form_of(name, chosen.forms, "dual")
+    return forces_of(name, chosen, in_form(dual_alone(Q), form), LoadCase(0 * p, -p), tolerance)
+
+
+def solve_series(
+    scene: Source,
+    cases: LoadCases | Iterable[LoadCase],
+    solver: str | Solver = "newton",
+    *,
+    options: Mapping[str, Any] | None = None,
+    form: Form | None = None,
+    tolerance: float = 1e-11,
+    limit_mm: float = LIMIT_MM,
+    check: int = 0,
+) -> Iterator[Result]:
+    """Solve load cases on one assembly: in blocks if the solver can, else each from the nearest answer.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        The scene, its name, the path of its file, or the content of its file.
+    cases : LoadCases or iterable of LoadCase
+        From `random_gaps`, or load cases of your own, taken and copied some at a time: a generator may have
+        no end and reuse its arrays. In the sparse form f has all unknowns of the model.
+    solver : str or Solver, optional
+        A solver by name, or an object of your own.
+    options : dict, optional
+        Options of a solver by name.
+    form : str, optional
+        "primal", "dual" or "sparse"; by default the usual one of the solver.
+    tolerance : float, optional
+        Passed to the solver.
+    limit_mm : float, optional
+        Limit on the displacement error, mm.
+    check : int, optional
+        Every `check`-th case is compared with the certified reference; 0: none.
+
+    Returns
+    -------
+    iterator of Result
+        For each case, in order: its `row` (status, iterations, seconds, residuals, the proven bound_mm,
+        verdict) and the remaining `gap`, (m,) mm in float32; None without an answer.
+
+    Raises
+    ------
+    InputError
+        If the scene, a load case or an option is wrong.
+
+    Examples
+    --------
+    >>> from rivetbench import LoadCase, own_matrices, solve_series
+    >>> scene = own_matrices([[100.0]], [[1.0]], [50.0], [0.2])
+    >>> cases = (LoadCase([50.0], [gap]) for gap in (0.2, 0.6))
+    >>> [f"{result.gap[0]:.3f}" for result in solve_series(scene, cases)]
+    ['0.000', '0.100']
+    """
+    scene = load_scene(scene)
+    name, chosen = solver_named(solver, options)
+    taken = form_of(name, chosen.forms, form)
+    first = cases if isinstance(cases, LoadCases) else Listed(())
+    job = Job(
+        scene, first, name, taken, tolerance, limit_mm, check, threads=None, options=dict(options or {})
+    )
+    session = SeriesSession(job, chosen)
+    if isinstance(cases, LoadCases):
+        return _results(session, [cases])
+    copies = _copies(cases, session.data.assembly)
+    return _results(session, _blocks(list(copies) if isinstance(cases, Sequence) else copies, session.block))
+
+
+def _copies(cases: Iterable[LoadCase], assembly: Assembly) -> Iterator[LoadCase]:
+    """Copies of the cases; one whose f is that of the case before shares its array: K⁻¹f is computed once."""
+    last = np.zeros(0)
+    for k, case in enumerate(cases):
+        f = _vector(f"case {k}", "f", case.f, assembly.n)
+        last = last if np.array_equal(f, last) else f
+        yield LoadCase(last, _vector(f"case {k}", "g", case.g, assembly.m))
+
+
+def _blocks(cases: Iterable[LoadCase], size: int) -> Iterator[LoadCases]:
+    """Cases that are solved together, with their numbers."""
+    cases, first = iter(cases), 0
+    while some := tuple(islice(cases, size)):
+        yield Listed(some, first)
+        first += len(some)
+
+
+def _results(session: SeriesSession, blocks: Iterable[LoadCases]) -> Iterator[Result]:
+    step = in_turn(next)
+    for cases in blocks:
+        session.job = replace(session.job, cases=cases)
+        results = session.solve(range(cases.first, cases.first + cases.count))
+        while some := step(results, None):
+            yield from some
+
+
+def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:
+    try:
+        vector = np.array(value, dtype=float)  # a copy, which a form may make read-only
+    except (TypeError, ValueError) as error:
+        raise InputError.one(where, name, value, "must be numbers") from error
+    if vector.shape != (size,):
+        raise InputError.one(where, f"{name}.shape", vector.shape, f"must be ({size},)")
+    for k in np.flatnonzero(~np.isfinite(vector))[:1]:
+        raise InputError.one(where, f"{name}[{k}]", NOT_FINITE, "every entry must be finite")
+    return vector
