@@ -12,7 +12,6 @@ from . import Indices, Matrix, Vector
 from .selected_inverse import BlockPart
 
 ENTRIES_AT_A_TIME = 2**15  # of a sparse block: a panel stays in the processor's cache
-COLUMNS_AT_A_TIME = 64  # of K⁻¹A
 
 
 class NotPositiveDefinite(np.linalg.LinAlgError):
@@ -82,10 +81,6 @@ class Block(ABC):
         """A proven bound on max (K⁻¹)_ii, mm/N, for κ ≤ λmin(DKD); infinite where none is cheap."""
         return np.inf
 
-    @abstractmethod
-    def compliance(self, A: sp.csc_array) -> Matrix:
-        """AᵀK⁻¹A, (m, m) mm/N, for A (size, m)."""
-
     def local_compliance(self, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
         """AᵀK⁻¹A for contacts that share a window; None where the factor does not give them cheaply."""
         return None
@@ -123,13 +118,6 @@ class SparseBlock(Block):
             parts = K.data[entries], K.indices[entries], K.indptr[start : stop + 1] - K.indptr[start]
             yield slice(start, stop), sp.csr_array(parts, shape=(stop - start, self.size))
             start = stop
-
-    def compliance(self, A: sp.csc_array) -> Matrix:
-        Q = np.empty(A.shape[1:] * 2)
-        for start in range(0, A.shape[1], COLUMNS_AT_A_TIME):
-            some = slice(start, start + COLUMNS_AT_A_TIME)
-            Q[:, some] = A.T @ self.solve(A[:, some].toarray())
-        return (Q + Q.T) / 2
 
 
 def scaled(M: sp.csc_array, rows: Vector, columns: Vector) -> sp.csc_array:

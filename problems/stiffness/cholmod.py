@@ -19,7 +19,7 @@ class Cholmod:
     Raises LinAlgError if K is not positive definite.
     """
 
-    nonzeros: int | None = None  # CVXOPT does not tell
+    nonzeros: int | None = None  # CVXOPT does not tell how many float64 L holds
 
     def __init__(self, K: sp.csc_array, lost: float) -> None:
         self.D = balanced_units(K.diagonal())
@@ -36,6 +36,7 @@ class Cholmod:
             raise np.linalg.LinAlgError("a pivot is but rounding")
 
     def solve(self, b: Matrix) -> Matrix:
+        """K⁻¹b, b (N,) or (N, k)."""
         x = matrix((self.D * np.asarray(b, dtype=float).T).T)
         cholmod.solve(self.L, x)
         return (self.D * np.array(x).reshape(b.shape).T).T

@@ -18,6 +18,7 @@ from .selected_inverse import BlockPart
 from .sparse_block import sparse_block
 
 POWER_STEPS = 5
+COLUMNS_AT_A_TIME = 64  # of K⁻¹A
 
 
 class Stiffness:
@@ -166,12 +167,17 @@ class Stiffness:
 
     def compliance(self, A: sp.csc_array) -> Matrix:
         """Q = AᵀK⁻¹A, (m, m), mm/N, by columns."""
+        self.ensure_factored()
         m = A.shape[1]
         Q = np.zeros((m, m), order="F")
-        self.ensure_factored()
-        for block, rows in self._blocks_with_rows():
-            if m:
+        dense = [block for block in self.blocks if isinstance(block, DenseBlock)]
+        if len(dense) == len(self.blocks):
+            for block, rows in zip(dense, self.slices, strict=True):
                 Q += block.compliance(sp.csc_array(A[rows]))
+        else:
+            for start in range(0, m, COLUMNS_AT_A_TIME):
+                some = slice(start, start + COLUMNS_AT_A_TIME)
+                Q[:, some] = A.T @ self.solve(A[:, some].toarray())
         return mirrored(Q)
 
     def local_compliance(
@@ -231,10 +237,6 @@ class ScaledStiffness(Stiffness):
     def panels(self) -> Iterator[tuple[slice, slice, Any]]:
         for rows, columns, panel in self.base.panels():
             yield rows, columns, sp.diags_array(self.D[rows]) @ panel @ sp.diags_array(self.D[columns])
-
-    def compliance(self, A: sp.csc_array) -> Matrix:
-        """Aᵀ(DKD)⁻¹A, which is the compliance of K for D⁻¹A."""
-        return self.base.compliance(scaled(A, 1 / self.D, np.ones(A.shape[1])))
 
 
 def _times(D: Vector, x: Matrix) -> Matrix:

@@ -6,7 +6,7 @@ McKee's. The first that gives a narrow band is taken.
 """
 
 from collections.abc import Iterator
-from typing import Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,6 +18,9 @@ from .band_factor import half_bandwidth
 from .banded_block import BandedBlock
 from .block import NotPositiveDefinite, SparseBlock, scaled
 from .superlu import SuperLU, moving_unknown
+
+if TYPE_CHECKING:
+    from .cholmod import Cholmod
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 WITH_INDICES = 1.5  # numbers of eight bytes per entry of a sparse matrix
@@ -45,23 +48,7 @@ def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Indices]:
     yield reverse_cuthill_mckee(sp.csr_matrix(K), symmetric_mode=True)
 
 
-class GeneralFactor(Protocol):
-    """A factor of K, made by a library; making it raises LinAlgError if K is not positive definite.
-
-    nonzeros : the float64 that it holds; None if the library does not tell.
-    """
-
-    @property
-    def nonzeros(self) -> int | None: ...
-
-    def solve(self, b: Matrix) -> Matrix:
-        """K⁻¹b, b (N,) or (N, k)."""
-
-    def backward_error(self) -> float | None:
-        """A bound on ‖E‖₂, but for its rounding, where K + E is positive definite; None if there is none."""
-
-
-def general_factor(K: sp.csc_array, lost: float) -> GeneralFactor:
+def general_factor(K: sp.csc_array, lost: float) -> "SuperLU | Cholmod":
     """Factor K by the best library installed. A pivot ≤ lost · k_ii counts as zero: K is singular."""
     try:
         from .cholmod import Cholmod  # of an extra
@@ -78,7 +65,7 @@ class GeneralBlock(SparseBlock):
     def __init__(self, matrix: sp.csc_array, width: int) -> None:
         super().__init__(matrix)
         self.width = width
-        self.general_factor: GeneralFactor | None = None
+        self.general_factor: SuperLU | Cholmod | None = None
 
     def replaced(self, matrix: sp.csc_array) -> Self:
         return type(self)(matrix, self.width)
@@ -87,7 +74,7 @@ class GeneralBlock(SparseBlock):
         self._ensured_factor()
         return []  # libraries keep their own
 
-    def _ensured_factor(self) -> GeneralFactor:
+    def _ensured_factor(self) -> "SuperLU | Cholmod":
         if self.general_factor is None:
             try:
                 self.general_factor = self.make_factor(self.matrix, self.lost)

@@ -28,12 +28,13 @@ class SuperLU:
             raise np.linalg.LinAlgError("a pivot is not positive")
 
     def solve(self, b: Matrix) -> Matrix:
+        """K⁻¹b, b (N,) or (N, k)."""
         x: Matrix = self.lu.solve(np.asarray(b, dtype=float))
         return x
 
     @property
     def nonzeros(self) -> int:
-        """L and U are kept."""
+        """The float64 that L and U hold."""
         return int(self.lu.L.nnz + self.lu.U.nnz)
 
     def backward_error(self) -> float | None:
