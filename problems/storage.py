@@ -1,13 +1,13 @@
-"""Arrays on disk under a hash of their data and code; opened memory-mapped, written atomically.
+"""The cache: arrays on disk under a hash of their data and code; opened memory-mapped, written atomically.
 
 An entry is a folder with one read-only .npy per array and a manifest: the size and the hash of each file,
-the facts, and a hash of it all. So what a disk has changed gets no proven bound; files too long to be read at
-each opening (`CHECKED`) have no hash.
+the facts, and a hash of it all. So no bound is proven for a file that the disk has changed. Files longer than
+`CHECKED` have no hash: reading them at each opening would take too long.
 
-A fingerprint, part of the identity of rows and cached matrices, is a hash of what code does. It ignores what
-cannot change a number: comments, layout, docstrings, annotations of functions, what `raise` raises, import
-lines and the locations of files. It includes the files that a file imports, directly or not, if they lie in
-the given folders.
+A fingerprint of code is a hash of what the code does; it is a part of the identity of rows and of cached
+matrices. It ignores comments, layout, docstrings, annotations of functions, the exceptions raised, import
+lines and the locations of files, which cannot change a number. It includes all files that a file imports,
+directly or not, if they lie in the given folders.
 """
 
 import ast
@@ -86,8 +86,7 @@ def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -
 
 
 def load(key: str) -> Entry | None:
-    """The entry's arrays, memory-mapped and read-only, and its facts; None if there is none, or an older
-    version's without hashes.
+    """The entry's arrays, memory-mapped and read-only, and its facts; None if there is no entry.
 
     Raises InputError if a file is missing or not what was written.
     """
@@ -99,18 +98,15 @@ def load(key: str) -> Entry | None:
         if not path.is_file():
             raise OSError("no regular file")
         content = json.loads(path.read_bytes())
-        written = content.pop("hash", None)
-        if written is None:
-            return None
-        if written != digest(content):
+        if content.pop("hash") != digest(content):
             raise ValueError("not what was written")
         arrays = {}
         for name, (size, hashed) in content["files"].items():
             path = folder / name
-            found = _stamp(path)
-            if found[0] != size:
-                raise InputError.one(path, "bytes", found[0], f"must be {size}; {_repair(folder)}")
-            if found[1] != hashed:
+            size_now, hashed_now = _stamp(path)
+            if size_now != size:
+                raise InputError.one(path, "bytes", size_now, f"must be {size}; {_repair(folder)}")
+            if hashed_now != hashed:
                 raise ValueError("not what was written")
             arrays[path.stem] = np.load(path, mmap_mode="r")
     except InputError:
@@ -122,15 +118,15 @@ def load(key: str) -> Entry | None:
 
 def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:
     """The entry, memory-mapped; if there is none yet, one process computes it while the others wait."""
-    found = load(key)
-    if found is None:
+    entry = load(key)
+    if entry is None:
         with lock(key):
-            found = load(key)
-            if found is None:
+            entry = load(key)
+            if entry is None:
                 store(key, *make())
-                found = load(key)
-    assert found is not None
-    return found
+                entry = load(key)
+    assert entry is not None
+    return entry
 
 
 def _stamp(path: Path) -> tuple[int | None, str | None]:
@@ -180,7 +176,7 @@ def _read(path: Path, root: Path, changed: int) -> tuple[str, tuple[Path, ...]]:
 
 
 class _WithoutText(ast.NodeTransformer):
-    """Removes from a tree, which has neither comments nor layout, what cannot change a number."""
+    """Removes from a syntax tree the parts that cannot change a number."""
 
     def generic_visit(self, node: ast.AST) -> Any:
         match node:
@@ -203,9 +199,9 @@ def _imported(path: Path, tree: ast.Module, root: Path) -> Iterator[Path]:
         if isinstance(node, ast.ImportFrom):
             folder = path.parents[node.level - 1] if node.level else root
             module = folder.joinpath(*(node.module or "").split("."))
-            names = [module, *(module / each.name for each in node.names)]
+            names = [module, *(module / alias.name for alias in node.names)]
         elif isinstance(node, ast.Import):
-            names = [root.joinpath(*each.name.split(".")) for each in node.names]
+            names = [root.joinpath(*alias.name.split(".")) for alias in node.names]
         else:
             continue
         files = [file for name in names for file in (name.with_suffix(".py"), name / "__init__.py")]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from problems.build import load_case
-from problems.errors import Fault, InputError
+from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import regular_file
@@ -24,8 +24,7 @@ from problems.storage import digest
 from . import LoadCases
 from .gap_tables import read_gaps
 
-ALLOWED = "every gap must be a finite number, in mm"
-MAX_FAULTS = 10  # reported one by one; the rest are counted
+MAX_NOTES = 10  # on unusual gaps; further ones are counted
 ROWS_AT_A_TIME = 256
 TABLE_MIB = 2**15
 
@@ -34,7 +33,7 @@ TABLE_MIB = 2**15
 class MeasuredGaps(LoadCases):
     """Case k is the scene with its gaps replaced by a row of the table.
 
-    gaps : (rows, m) mm. numbers : the case numbers of the rows, unless 0, 1, 2, …
+    gaps : (rows, m) mm. numbers : the case number of each row; empty if they are 0, 1, 2, …
     """
 
     forces: LoadCase
@@ -45,18 +44,20 @@ class MeasuredGaps(LoadCases):
 
     @property
     def key(self) -> str:
-        """Hash of the width alone: a table may grow during a series, and each case has its own hash."""
+        """Hash of the number of contacts alone: a table may grow during a series; `parameters` has a hash of
+        each case.
+        """
         return digest("table", self.gaps.shape[1])
 
     def parameters(self, k: int) -> dict[str, float | str]:
-        """The hash of its gaps, which reveals a row that has changed since."""
+        """The hash of the gaps of case k, which reveals a row that has changed since."""
         return {"gaps": digest(np.ascontiguousarray(self._row(k)).tobytes())}
 
     def load(self, k: int) -> LoadCase:
         return LoadCase(self.forces.f, np.array(self._row(k)))
 
     def only(self, numbers: Sequence[int]) -> MeasuredGaps:
-        """Without the other rows."""
+        """The table without the rows of other cases."""
         return replace(self, gaps=np.array([self._row(k) for k in numbers]), numbers=tuple(numbers))
 
     def _row(self, k: int) -> Vector:
@@ -74,11 +75,11 @@ def measured_gaps(
 
     An .npz must hold an array `gaps`, or a single array; an .npy is memory-mapped, the others are read into
     memory. A .csv (or .csv.gz) may have a header and a column that counts its rows: see gap_tables.py. A gap
-    that `options` marks as missing becomes that of the nearest contact of its pair. Raises InputError naming
-    the cases with faults.
+    that `options` marks as missing becomes that of the nearest contact of its pair. Raises InputError, which
+    names the first case with a fault.
     """
     effects = scene.effects if isinstance(scene, JointScene) else ()
-    forces = load_case(scene, form, [each for each in effects if not isinstance(each, GapEffect)])
+    forces = load_case(scene, form, [effect for effect in effects if not isinstance(effect, GapEffect)])
     m = len(forces.g)
     gaps = _read(regular_file(path, "file", TABLE_MIB), m, options)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
@@ -91,11 +92,7 @@ def measured_gaps(
     if options.missing and isinstance(scene, JointScene):
         gaps, lost = _completed(scene.joint, np.where(np.isin(gaps, options.numbers), np.nan, gaps))
         notes = [f"{path}: {lost} missing gaps are taken from the nearest contact of their case"] * bool(lost)
-    faults = list(_faults(path, gaps))
-    if faults:
-        more = len(faults) - MAX_FAULTS
-        rest = [Fault(str(path), "cases", f"{more} more", ALLOWED)] if more > 0 else []
-        raise InputError(faults[:MAX_FAULTS] + rest)
+    _refuse_infinite(path, gaps)
     notes += _unusual(scene, path, gaps[:count])
     return MeasuredGaps(forces, gaps, len(gaps) if count is None else count, notes=tuple(notes))
 
@@ -121,26 +118,27 @@ def _unusual(scene: Scene, path: Path, gaps: Matrix) -> Iterator[str]:
     joint, near = scene.joint if isinstance(scene, JointScene) else None, None
     if joint:
         beside = [joint.span(pair).start + neighbours(joint.places(pair)) for pair in joint.pairs]
-        near = np.concatenate(beside) if len({each.shape[1] for each in beside}) == 1 else None
-    count = 0
-    for k, case in enumerate(gaps):
-        for contact in np.flatnonzero(outliers(np.asarray(case), near)):
-            count += 1
-            if count <= MAX_FAULTS:
-                usual = f"{np.median(case):.3g} mm, the median of the case"
-                yield f"{path}: case {k}, contact {contact} = {case[contact]:g} is unusual; usual is {usual}"
-    if count > MAX_FAULTS:
-        yield f"{path}: {count - MAX_FAULTS} more gaps are unusual"
+        near = np.concatenate(beside) if len({some.shape[1] for some in beside}) == 1 else None
+    marks = np.array([outliers(np.asarray(case), near) for case in gaps])
+    places = np.argwhere(marks).tolist()
+    for k, contact in places[:MAX_NOTES]:
+        usual = f"{np.median(gaps[k]):.3g} mm, the median of the case"
+        yield f"{path}: case {k}, contact {contact} = {gaps[k, contact]:g} is unusual; usual is {usual}"
+    if len(places) > MAX_NOTES:
+        yield f"{path}: {len(places) - MAX_NOTES} more gaps are unusual"
 
 
-def _faults(path: Path, gaps: Matrix) -> Iterator[Fault]:
+def _refuse_infinite(path: Path, gaps: Matrix) -> None:
+    """Raises InputError with the first gap that is not finite, and the number of cases that have one."""
+    cases: list[int] = []
     for start in range(0, len(gaps), ROWS_AT_A_TIME):
-        wrong = ~np.isfinite(gaps[start : start + ROWS_AT_A_TIME])
-        for row in np.flatnonzero(wrong.any(axis=1)):
-            contacts = np.flatnonzero(wrong[row])
-            others = f" and {len(contacts) - 1} more" if len(contacts) > 1 else ""
-            value = float(gaps[start + row, contacts[0]])
-            yield Fault(str(path), f"case {start + row}, contact {contacts[0]}{others}", value, ALLOWED)
+        finite = np.isfinite(gaps[start : start + ROWS_AT_A_TIME]).all(axis=1)
+        cases += (start + np.flatnonzero(~finite)).tolist()
+    if cases:
+        contact = int(np.argmin(np.isfinite(gaps[cases[0]])))
+        more = f"; {len(cases) - 1} more cases have such gaps" if len(cases) > 1 else ""
+        where, value = f"case {cases[0]}, contact {contact}", float(gaps[cases[0], contact])
+        raise InputError.one(path, where, value, f"every gap must be a finite number, in mm{more}")
 
 
 def _read(path: Path, m: int, options: TableOptions) -> Matrix:

@@ -83,27 +83,27 @@ def band_solve(L: Matrix, b: Matrix) -> Matrix:
     )
 
     def part(row: int, column: int, rows: int, columns: int) -> Matrix:
-        """Of L from (row, column) on, not copied; what is not in the band is arbitrary."""
+        """A part of L from (row, column) on, not copied; entries outside the band are arbitrary."""
         step = entries.itemsize
         return np.ndarray(
             (rows, columns), float, entries, (column * width + row) * step, (step, width * step)
         )
 
     for start, stop in pairwise(edges):
-        own, after, count = X[start:stop], X[stop : stop + width], min(width, size - stop)
+        block, after, count = X[start:stop], X[stop : stop + width], min(width, size - stop)
         diagonal = part(start, start, stop - start, stop - start)
-        blas.dtrsm(1.0, diagonal, own.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+        blas.dtrsm(1.0, diagonal, block.T, side=1, lower=1, trans_a=1, overwrite_b=1)
         if count:  # L_{i+1,i} is a triangle, and a rectangle beside it where K ends before the band does
             triangle = part(stop, start, count, count)
-            after -= blas.dtrmm(1.0, triangle, own[:count].T, side=1, trans_a=1).T
-            after -= part(stop, start + count, count, width - count) @ own[count:]
+            after -= blas.dtrmm(1.0, triangle, block[:count].T, side=1, trans_a=1).T
+            after -= part(stop, start + count, count, width - count) @ block[count:]
     for start, stop in reversed([*pairwise(edges)]):
-        own, after, count = X[start:stop], X[stop : stop + width], min(width, size - stop)
+        block, after, count = X[start:stop], X[stop : stop + width], min(width, size - stop)
         if count:
-            own[:count] -= blas.dtrmm(1.0, part(stop, start, count, count), after.T, side=1).T
-            own[count:] -= part(stop, start + count, count, width - count).T @ after
+            block[:count] -= blas.dtrmm(1.0, part(stop, start, count, count), after.T, side=1).T
+            block[count:] -= part(stop, start + count, count, width - count).T @ after
         diagonal = part(start, start, stop - start, stop - start)
-        blas.dtrsm(1.0, diagonal, own.T, side=1, lower=1, overwrite_b=1)
+        blas.dtrsm(1.0, diagonal, block.T, side=1, lower=1, overwrite_b=1)
     return X
 
 

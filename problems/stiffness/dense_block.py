@@ -54,7 +54,7 @@ class DenseBlock(Block):
         return product(self.matrix, x)
 
     def solve(self, b: Matrix) -> Matrix:
-        """For a single column without LAPACK's blocked solution, which takes twice the time."""
+        """K⁻¹b; a single column without LAPACK's blocked solution, which takes twice the time."""
         if b.size > self.size:
             return sla.cho_solve((self.U, False), b, check_finite=False)
         return blas.dtrsv(self.U, blas.dtrsv(self.U, b.ravel(), trans=1)).reshape(b.shape)
@@ -137,7 +137,7 @@ class InverseBlock(DenseBlock):
 
     @cached_property
     def matrix(self) -> Matrix:
-        """K, by a Cholesky factor of Q, when it is first asked for. Raises NotPositiveDefinite."""
+        """K, by a Cholesky factor of Q. Raises NotPositiveDefinite."""
         return mirrored(sla.cho_solve((cholesky(self.Q), False), np.eye(len(self.Q), order="F")))
 
     @property
@@ -156,8 +156,8 @@ class InverseBlock(DenseBlock):
 
 
 def product(G: Matrix, v: Matrix) -> Matrix:
-    """G v for G symmetric, column-major, v (m,) or columns (m, k). One reads a triangle, or only the
-    columns where v is nonzero.
+    """G v for G symmetric, column-major, v (m,) or (m, k). A single column reads one triangle of G, or only
+    the columns of G where v is nonzero.
 
     Only SciPy's BLAS is called: NumPy's has its own thread pool, and each pool spins while the other works.
     """
@@ -166,10 +166,10 @@ def product(G: Matrix, v: Matrix) -> Matrix:
     one = v.ravel()
     support = np.flatnonzero(one)
     if support.size > SPARSE_LIMIT * len(one):
-        found = blas.dsymv(1.0, G, one, lower=1)  # faster than the upper triangle
+        result = blas.dsymv(1.0, G, one, lower=1)  # faster than the upper triangle
     else:
-        found = blas.dgemv(1.0, G.T[support].T, one[support]) if support.size else np.zeros(len(one))
-    return found.reshape(v.shape)
+        result = blas.dgemv(1.0, G.T[support].T, one[support]) if support.size else np.zeros(len(one))
+    return result.reshape(v.shape)
 
 
 def dense_blocks(K: sp.csr_array) -> list[Matrix]:
@@ -178,8 +178,8 @@ def dense_blocks(K: sp.csr_array) -> list[Matrix]:
 
 
 def dense_slices(K: sp.csr_array) -> list[slice]:
-    """The unknowns of each dense block of a sparse K: bodies, neighbours put together while they have no more
-    unknowns than the largest, or `DENSE_BLOCK`. One block, where the bodies' unknowns are interleaved.
+    """The unknowns of each dense block of a sparse K: its unconnected bodies; neighbours share a block that
+    has no more unknowns than the largest body, or `DENSE_BLOCK`. One block where bodies are interleaved.
     """
     count, label = connected_components(K, directed=False)
     starts = np.flatnonzero(np.diff(label, prepend=-1))
@@ -187,26 +187,26 @@ def dense_slices(K: sp.csr_array) -> list[slice]:
         starts = starts[:1]
     ends = np.append(starts[1:], K.shape[0])
     most = max(int((ends - starts).max()), DENSE_BLOCK)
-    found, begin = [], 0
+    slices, begin = [], 0
     for end, following in pairwise([*ends.tolist(), K.shape[0] + most + 1]):
         if following - begin > most:
-            found.append(slice(begin, end))
+            slices.append(slice(begin, end))
             begin = end
-    return found
+    return slices
 
 
 def panels(count: int) -> Iterator[slice]:
-    """Of consecutive columns, so few that no copy of them is as large as the matrix."""
+    """Groups of consecutive columns, so few that no copy of them is as large as the matrix."""
     return (slice(first, min(first + PANEL, count)) for first in range(0, count, PANEL))
 
 
 def mirrored(M: Matrix) -> Matrix:
-    """M (n, n) itself, with its lower triangle as the upper one, too."""
-    for own in panels(len(M)):
-        after = slice(own.stop, None)
-        square = np.tril(M[own, own])
-        M[own, own] = square + np.tril(square, -1).T
-        M[own, after] = M[after, own].T
+    """M (n, n) itself, its lower triangle copied to the upper one."""
+    for columns in panels(len(M)):
+        after = slice(columns.stop, None)
+        square = np.tril(M[columns, columns])
+        M[columns, columns] = square + np.tril(square, -1).T
+        M[columns, after] = M[after, columns].T
     return M
 
 

@@ -90,18 +90,6 @@ def test_of_long_files_the_size_alone_is_checked(root: Path, monkeypatch: pytest
     assert storage.load("key") is not None
 
 
-@pytest.mark.parametrize("content", [b"{}", b'{"files": {"one.npy": 4928}, "facts": {}}'])
-def test_an_entry_without_hashes_is_made_anew(root: Path, content: bytes) -> None:
-    """One of an older version."""
-    storage.store("key", ARRAYS, {})
-    manifest = root / "key" / storage.MANIFEST
-    manifest.unlink()
-    manifest.write_bytes(content)
-    assert storage.load("key") is None
-    arrays, facts = storage.load_or_make("key", lambda: ({"two": np.ones(2)}, {"n": 1}))
-    assert (list(arrays), facts) == (["two"], {"n": 1})
-
-
 @pytest.mark.parametrize("content", [b"", b"[]", b"[" * 100_000, b"\xff", None, b'{"files": [], "hash": ""}'])
 def test_a_damaged_manifest_is_named_with_what_to_do(root: Path, content: bytes | None) -> None:
     storage.store("key", ARRAYS, {})

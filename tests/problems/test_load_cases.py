@@ -133,7 +133,9 @@ def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, data: Prep
         measured_gaps(scene, path, 31)
 
 
-def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_path: Path) -> None:
+def test_the_first_gap_of_a_table_that_is_no_number_is_named(
+    scene: Scene, data: Prepared, tmp_path: Path
+) -> None:
     m = data.assembly.m
     gaps = np.full((500, m), 0.1)
     path = tmp_path / "gaps.npy"
@@ -142,16 +144,9 @@ def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_pat
     np.save(path, gaps)
     with pytest.raises(InputError) as error:
         measured_gaps(scene, path)
-    lines = said(error).splitlines()
-    assert len(lines) == 2
-    assert "gaps.npy: case 412, contact 7 and 1 more = nan: every gap must be a finite number" in lines[0]
-    assert "case 499, contact 0 = inf" in lines[1]
-    gaps[:, 3] = np.nan
-    np.save(path, gaps)
-    with pytest.raises(InputError) as error:
-        measured_gaps(scene, path)
-    assert len(error.value.faults) == 11
-    assert "490 more" in said(error)
+    assert "gaps.npy: case 412, contact 7 = nan: every gap must be a finite number, in mm; 1 more" in said(
+        error
+    )
 
 
 @pytest.mark.parametrize(
