@@ -190,7 +190,7 @@ def _read_all(sources: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[
             if bool(name) != named:
                 continue
             if name:
-                read = {name: formats.read_stiffness(path, matrix, name)}
+                read = {name: formats.read_stiffness(path, matrix, name)[:2]}
             else:
                 read = formats.read_labelled(path, partial(_of_problem, faults, path))
             for key, (values, labels) in read.items():

@@ -101,14 +101,16 @@ def read(path: Path) -> Data:
     return {name: vector(M) if name in ("f", "g") else M for name, (M, _) in read_labelled(path).items()}
 
 
-def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tuple[Any, Labels]:
-    """One matrix of a file, that of the name `matrix`, or else `name`, or the only one; and the node and
-    degree of freedom of each row, if the file says them.
+def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tuple[Any, Labels, list[str]]:
+    """One matrix of a file: the one called `matrix`, or else `name`, or the only one.
 
-    Raises InputError.
+    Returns the matrix, the node and degree of freedom of each row (n, 2) if the file has labels, and the
+    names of the other arrays in the file. Raises InputError.
     """
+    others: list[str] = []
 
     def choose(names: Sequence[str]) -> list[str]:
+        others.extend(names)
         hits = [one for one in names if one == (matrix or name)]
         if not hits:
             hits = [one for one in names if not matrix or one.lower() == matrix.lower()]
@@ -118,8 +120,9 @@ def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tu
         how = f'choose one by matrix = "NAME" in a part, {name}=FILE:NAME for import'
         raise InputError.one(path, "matrices", list(names), f"a matrix {wanted}; {how}")
 
-    ((M, labels),) = read_labelled(path, choose).values()
-    return M, labels
+    ((chosen, (M, labels)),) = read_labelled(path, choose).items()
+    others += matrix_files.texts_of(path)
+    return M, labels, [one for one in others if one != chosen]
 
 
 def read_labelled(path: Path, choose: Choose = list) -> Read:

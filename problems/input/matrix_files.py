@@ -20,6 +20,7 @@ from problems.forms.assembly import Vector
 from .matrix_entries import from_entries, read_entries, refuse_twice
 from .text_files import read_bytes
 
+NUMBERS, TEXT = [*"fiubc"], [*"US"]  # kinds of the entries of arrays
 PARTS = ("data", "indices", "indptr", "shape")
 MIB = 16_384  # of a text file of one matrix
 LARGEST_SIZE = 10**8  # rows or columns
@@ -82,7 +83,7 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
             stems = [name for name in stems if all(f"{name}_{part}" in files for part in PARTS)]
             parts = {f"{name}_{part}" for name in stems for part in PARTS}
             plain = [name for name in archive.files if name not in parts]
-            names = stems + [name for name in plain if name in expected or _numeric(archive, name)]
+            names = stems + [name for name in plain if name in expected or _kind(archive, name) in NUMBERS]
             found = {
                 name: unpacked(archive, name) if name in stems else archive[name] for name in choose(names)
             }
@@ -93,12 +94,20 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def _numeric(archive: Any, name: str) -> bool:
-    """Whether an array has numbers and a dimension."""
+def texts_of(path: Path) -> list[str]:
+    """The names of the arrays of text in an .npz."""
+    if path.suffix.lower() != ".npz":
+        return []
+    with np.load(path) as archive:
+        return [name for name in archive.files if _kind(archive, name) in TEXT]
+
+
+def _kind(archive: Any, name: str) -> str:
+    """The kind of an array's entries; "" if it has no dimension, or holds objects."""
     try:
-        return bool(archive[name].dtype.kind in "fiubc" and archive[name].ndim)
+        return archive[name].dtype.kind if archive[name].ndim else ""
     except ValueError:  # of objects
-        return False
+        return ""
 
 
 def _refuse_damaged(name: str, M: Any) -> None:

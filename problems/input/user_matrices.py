@@ -31,6 +31,7 @@ SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A
 SMALL = 2000  # unknowns up to which a K is solved in the dense forms
 LOST = 2.0**-44  # of ‖a_j‖₂², per contact and entry: 256 ulps, for ‖z‖²
 SHOWN = 5  # columns named in a message
+UNCHANGED = "the file that it was when the scene was read"
 SLIGHT = 1e-6  # of the largest: a coefficient that is rounding
 
 
@@ -48,6 +49,8 @@ def stored_matrices(
     def made() -> storage.Entry:
         start = time.perf_counter()
         assembly, load = read_matrices(files, sparse)
+        if content_key(files) != files_key:
+            raise InputError.one(next(iter(files.values())), "matrices", "changed", UNCHANGED)
         arrays = {f"K{k}": matrix for k, matrix in enumerate(assembly.K.matrices)}
         arrays |= {"A": assembly.A, "f": load.f, "g": load.g}
         if assembly.nodes is not None:
@@ -61,6 +64,11 @@ def stored_matrices(
     A = matrix_files.unpacked(arrays, "A")
     assembly = Assembly(K, A, nodes, tuple(facts["parts"]), tuple(facts["notes"]))
     return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
+
+
+def content_key(files: Mapping[str, Path]) -> str:
+    """The hash of the content of files of matrices."""
+    return storage.digest(list(files), *(path.read_bytes() for path in files.values()))
 
 
 def holds_sparse(files: dict[str, Path]) -> bool:

@@ -27,25 +27,26 @@ from problems.formats import DENSEST, read_stiffness
 from problems.forms.assembly import Indices, Matrix
 from problems.input import matrix_files
 from problems.input.bounded_types import Name, regular_file
-from problems.input.user_matrices import SMALL, checked
+from problems.input.user_matrices import SMALL, UNCHANGED, checked
 from problems.storage import fingerprint
 
 from .joint import Table
 from .node_table import Nodes, listed, read_nodes
-from .superelement_rows import Order, rows_of
+from .superelement_rows import NORMAL_ALONE, Order, rows_of
 
 MIB = 16_384
-LOST = 0.05  # of a normal: what may be along degrees of freedom that are not kept
-FREE = 1e-9  # of the largest |K||r|: a force Kr that is none; held parts have 1e-4 and more, free ones 1e-12
-SHARE = 0.3  # of its largest component: what a motion is named after
+LOST = 0.05  # the largest share of a normal along degrees of freedom that K does not keep
+FREE = 1e-9  # of max |K||r|: a smaller Kr is no force; held parts have 1e-4 and more, free ones 1e-12
+SHARE = 0.3  # of a motion's largest component: smaller components do not name it
 DIRECTIONS = "xyz"
 Dof = Annotated[int, Field(ge=1, le=6)]
 
 
 class SuperelementTable(Table):
-    """[[joint.part]]: the files of K and of its nodes; dofs and rows, where the file of K does not say them.
+    """A [[joint.part]]: the files of K and of its nodes.
 
-    matrix : the name of K in a file with several.
+    matrix : the name of K in a file with several. rows, dofs : which node and degree of freedom each row of K
+    is, if the file of K has no labels; dofs is (3,) by default.
     """
 
     name: Name
@@ -53,22 +54,23 @@ class SuperelementTable(Table):
     nodes: str
     matrix: Annotated[str, Field(min_length=1)] | None = None
     rows: Order | None = None
-    dofs: Annotated[tuple[Dof, ...], Field(min_length=1, max_length=6)] = (3,)
+    dofs: Annotated[tuple[Dof, ...], Field(min_length=1, max_length=6)] | None = None
 
     @field_validator("dofs")
     @classmethod
-    def _each_once(cls, dofs: tuple[Dof, ...]) -> tuple[Dof, ...]:
-        if len(set(dofs)) < len(dofs):
+    def _each_once(cls, dofs: tuple[Dof, ...] | None) -> tuple[Dof, ...] | None:
+        if dofs and len(set(dofs)) < len(dofs):
             raise ValueError("must name each once")
         return dofs
 
 
 @dataclass(frozen=True, eq=False)
 class Superelement:
-    """node, dof (n,) : the node, by its place in the table, and the degree of freedom of each unknown.
+    """A part with its nodes and the meaning of its unknowns.
 
-    content : a hash of what its files hold. source : of K's file alone, and the name of its matrix.
-    dofs : of each node, if the file does not say them.
+    node, dof (n,) : the node, an index into `nodes`, and the degree of freedom of each unknown.
+    content : a hash of its files' content. source : the hash of K's file alone, and the name of its matrix.
+    dofs : the degrees of freedom of each node, for a file without labels.
     """
 
     name: str
@@ -82,7 +84,7 @@ class Superelement:
 
     @classmethod
     def of(cls, folder: Path, table: SuperelementTable) -> Superelement:
-        """Raises InputError with all faults of its files."""
+        """Read a part's files. Raises InputError with all faults of them."""
         path, faults, nodes, entry = folder / table.superelement, [], None, None
         try:
             nodes = read_nodes(folder / table.nodes)
@@ -96,19 +98,20 @@ class Superelement:
         if nodes is None or entry is None:
             raise InputError(faults)
         node, dof = rows_of(path, folder / table.nodes, nodes, entry[0], table.dofs, table.rows)
-        given = [array.tolist() for array in (nodes.xyz, nodes.normal, nodes.contact, node, dof)]
-        found = cls(table.name, path, storage.digest(source, given), source, table.dofs, nodes, node, dof)
-        if (lost := found._lost).size:
+        content = [array.tolist() for array in (nodes.xyz, nodes.normal, nodes.contact, node, dof)]
+        dofs, key = table.dofs or NORMAL_ALONE, storage.digest(source, content)
+        part = cls(table.name, path, key, source, dofs, nodes, node, dof)
+        if (lost := part._lost).size:
             where = f"{len(lost)} nodes of the contact surface, ids {listed(map(str, nodes.ids[lost]))}"
             kept = (
                 "K must keep the displacement along the normal of each contact node; contact = 0 excepts one"
             )
             raise InputError.one(folder / table.nodes, "nodes", where, kept)
-        return found
+        return part
 
     @property
     def key(self) -> str:
-        """Of what it adds to a model: what its files hold, and the code that reads them."""
+        """The hash of its files' content and of the code that reads them."""
         return storage.digest(stored_key(*self.source), self.content)
 
     @property
@@ -138,13 +141,13 @@ class Superelement:
         """(contact nodes, n): picks the displacements along x, y or z (0, 1, 2); zero where none is kept."""
         place = np.full(len(self.nodes.ids), -1)
         place[self.contacts] = np.arange(len(self.contacts))
-        own = np.flatnonzero((self.dof == direction + 1) & (place[self.node] >= 0))
-        entries = np.ones(len(own)), (place[self.node[own]], own)
+        unknowns = np.flatnonzero((self.dof == direction + 1) & (place[self.node] >= 0))
+        entries = np.ones(len(unknowns)), (place[self.node[unknowns]], unknowns)
         return sp.csr_array(entries, shape=(len(self.contacts), self.size))
 
     @property
     def _lost(self) -> Indices:
-        """The contact nodes along whose normal something is not kept."""
+        """The contact nodes whose displacement along the normal is not kept by K."""
         kept = np.zeros((len(self.nodes.ids), 6), dtype=bool)
         kept[self.node, self.dof - 1] = True
         lost = np.linalg.norm(np.where(kept[:, :3], 0.0, self.nodes.normal), axis=1)
@@ -176,7 +179,7 @@ class Superelement:
         return np.asarray(R[:, none])
 
     def named(self, motions: Matrix) -> str:
-        """What motions (n, r), orthonormal and rigid, are: translation along z, rotation about x, …"""
+        """The words for motions (n, r), orthonormal and rigid: translation along z, rotation about x, …"""
         R = self.rigid
         sizes = np.linalg.norm(R, axis=0)
         inside = np.linalg.norm(R - motions @ (motions.T @ R), axis=0) <= 1e-6 * sizes
@@ -191,13 +194,13 @@ class Superelement:
 
 
 def stored_key(content: str, matrix: str | None) -> str:
-    """Of K in the cache: its file's bytes, which of its matrices, and the code that reads and checks it."""
+    """The key of K in the cache: its file's content, its name, and the code that reads and checks it."""
     code = fingerprint([Path(__file__)], within=("problems/formats", "problems/input"))
     return storage.digest("superelement", content, matrix, code)
 
 
 def _hash(path: Path) -> str:
-    """Of what the file holds now: two files of one size and time may differ. Raises InputError."""
+    """The hash of a file's bytes, as two files of one size and time may differ. Raises InputError."""
     try:
         with regular_file(path, "superelement", MIB).open("rb") as file:
             return storage.digest(path.suffixes[-2:], hashlib.file_digest(file, "sha256").hexdigest())
@@ -209,19 +212,19 @@ def stored(path: Path, content: str, matrix: str | None) -> storage.Entry:
     """K, checked, and the labels of its rows if the file has any, from the cache. Raises InputError."""
 
     def made() -> storage.Entry:
-        given, labels = read_stiffness(path, matrix)
-        n = given.shape[0]
+        as_read, labels, unread = read_stiffness(path, matrix)
+        n = as_read.shape[0]
         nothing = {"A": sp.csc_array((n, 0)), "f": np.zeros(n), "g": np.zeros(0)}
-        sparse = sp.issparse(given) and n > SMALL and given.nnz <= DENSEST * n**2
-        assembly, _ = checked({"K": given} | nothing, dict.fromkeys("KAfg", str(path)), sparse=True)
+        sparse = sp.issparse(as_read) and n > SMALL and as_read.nnz <= DENSEST * n**2
+        assembly, _ = checked({"K": as_read} | nothing, dict.fromkeys("KAfg", str(path)), sparse=True)
         if _hash(path) != content:
-            raise InputError.one(
-                path, "superelement", "changed", "the file that it was when the scene was read"
-            )
-        K = assembly.K.matrix
+            raise InputError.one(path, "superelement", "changed", UNCHANGED)
+        K, notes = assembly.K.matrix, list(assembly.notes)
+        if unread:
+            notes.append(f"Not read of {path.name}: {', '.join(unread)}")
         arrays = matrix_files.packed({"K": K if sparse else K.toarray(order="F")})
         if labels is not None:
             arrays["labels"] = labels
-        return arrays, {"notes": assembly.notes, "sparse": bool(sparse)}
+        return arrays, {"notes": notes, "sparse": bool(sparse)}
 
     return storage.load_or_make(stored_key(content, matrix), made)

@@ -19,6 +19,7 @@ from .node_table import Nodes, listed
 
 Order = Literal["table", "ids", "directions"]
 Rows = tuple[Indices, Indices]
+NORMAL_ALONE = (3,)  # dofs, if neither the file of K nor the scene says them
 FIRST = 7  # rows that are printed
 SAMPLE, STRONGEST = 64, 4  # rows that are looked at; nodes that each is coupled to most
 BETTER, FAR = 3.0, 10  # times the rank of another order; the rank of nodes at random is half their number
@@ -35,13 +36,21 @@ def by_order(order: Order, nodes: Nodes, dofs: tuple[int, ...]) -> Rows:
 
 
 def rows_of(
-    path: Path, table: Path, nodes: Nodes, arrays: Any, dofs: tuple[int, ...], order: Order | None
+    path: Path, table: Path, nodes: Nodes, arrays: Any, dofs: tuple[int, ...] | None, order: Order | None
 ) -> Rows:
-    """Of K in the file `path`, packed in arrays. order : None if the scene says none. Raises InputError."""
+    """The node and degree of freedom of each row of K, of the file `path`, packed in arrays.
+
+    dofs, order : those of the scene, None if it does not say them. Raises InputError.
+    """
     if "labels" in arrays:
         if order:
             raise InputError.one(path, "rows", order, "leave it out: this file says which row is which node")
-        return _labelled(path, table, nodes, arrays["labels"], dofs)
+        node, dof = _labelled(path, table, nodes, arrays["labels"], dofs or NORMAL_ALONE)
+        if dofs and {*dofs} != (there := {*dof.tolist()}):
+            allowed = f"leave it out: the labels of this file are dofs {sorted(there)}"
+            raise InputError.one(path, "dofs", list(dofs), allowed)
+        return node, dof
+    dofs = dofs or NORMAL_ALONE
     count = int(arrays["K_shape"][0]) if "K_shape" in arrays else len(arrays["K"])
     if count != len(nodes.ids) * len(dofs):
         rows = f"{len(nodes.ids)} nodes of {table} with the dofs {list(dofs)} are"

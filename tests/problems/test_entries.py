@@ -46,7 +46,7 @@ def text(form: str, entries: list[tuple[int, int, float]], symmetric: bool = Tru
 
 def read(content: bytes, name: str, matrix: str | None = None) -> Any:
     Path(name).write_bytes(content)
-    M, _ = formats.read_stiffness(Path(name), matrix)
+    M, *_ = formats.read_stiffness(Path(name), matrix)
     data = {"K": M, "A": sp.csc_array((2, 0)), "f": np.zeros(2), "g": np.zeros(0)}
     return checked(data, {"K": name}, sparse=True)[0].K.matrix.toarray()
 
@@ -75,7 +75,7 @@ def test_both_triangles_one_or_contradictory_ones(form: str, symmetric: bool) ->
 def test_zeros_that_are_listed_are_read_and_stay_in_the_callers_matrix(form: str) -> None:
     zeros = [(1, 1, 4.0), (1, 2, 0.0), (2, 1, 0.0), (2, 2, 3.0)]
     np.testing.assert_array_equal(read(text(form, zeros, symmetric=False), NAMES[form]), np.diag([4.0, 3.0]))
-    M, _ = formats.read_stiffness(Path(NAMES[form]))
+    M, *_ = formats.read_stiffness(Path(NAMES[form]))
     checked({"K": M, "A": sp.csc_array((2, 0)), "f": np.zeros(2), "g": np.zeros(0)}, {})
     np.testing.assert_array_equal(sp.coo_array(M).toarray(), np.diag([4.0, 3.0]))
 

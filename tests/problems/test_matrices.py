@@ -15,8 +15,9 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
+from problems.input import user_matrices
 from problems.input.matrix_files import read_mtx
-from problems.input.user_matrices import checked
+from problems.input.user_matrices import checked, read_matrices
 from problems.scene_files import read_scene
 
 
@@ -31,6 +32,21 @@ def write_npz(folder: Path, **changes: Any) -> Path:
     path = folder / "mine.npz"
     np.savez(path, **{key: value for key, value in (DATA | changes).items() if value is not None})
     return path
+
+
+def test_a_file_that_is_replaced_while_it_is_read_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The matrices of one file would be kept under the hash of the other."""
+
+    def read_slowly(*arguments: Any) -> Any:
+        write_npz(tmp_path, f=2 * DATA["f"])
+        return read_matrices(*arguments)
+
+    scene = read_scene(str(write_npz(tmp_path)))
+    monkeypatch.setattr(user_matrices, "read_matrices", read_slowly)
+    with pytest.raises(InputError, match="the file that it was when the scene was read"):
+        prepared(scene)
 
 
 def check_data(made: Prepared, load: LoadCase) -> None:

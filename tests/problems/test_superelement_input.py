@@ -74,6 +74,9 @@ FILES: dict[str, tuple[Callable[[Path], list[Tables]], str, str, str]] = {
         lambda f: two(f, normals=tilted(4, [0, 0.6, 0.8])), "nodes", "ids 5", "along the normal",
     ),
     "a dof twice": (lambda f: two(f, dofs=[3, 3]), "part.1.dofs", "[3, 3]", "each once"),
+    "dofs against labels": (
+        lambda f: two(f, format="abaqus", id=range(1, 25), dofs=[1]), "dofs", "[1]", "are dofs [3]",
+    ),
     "unknown dof": (lambda f: two(f, dofs=[7]), "part.1.dofs.0", "7", "less than or equal to 6"),
 }  # fmt: skip
 
@@ -103,7 +106,15 @@ def test_a_wrong_file_has_one_clear_message(case: str, tmp_path: Path) -> None:
     assert key in fault.key
     assert value in str(fault.value)
     assert allowed in fault.allowed
-    assert "b." in fault.where or case in ("a dof twice", "unknown dof")
+    assert "b." in fault.where or "dof" in case
+
+
+def test_what_is_not_read_of_a_part_is_noted(tmp_path: Path) -> None:
+    parts = two(tmp_path)
+    names = {"labels": np.arange(24), "titles": np.array(["a"] * 24)}
+    np.savez(tmp_path / "b.npz", K=HELD, version=7, **names)
+    made = prepared(scene_from(parts))
+    assert made.assembly.notes == ("b: Not read of b.npz: labels, titles",)
 
 
 def refused(parts: list[Tables], *effects: Tables, **joint: Any) -> list[Fault]:
