@@ -14,6 +14,7 @@ import numpy as np
 from harness.solving.session import SolverSession
 from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
 from harness.verification.judge import LIMIT_MM
+from problems.errors import InputError
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
 from problems.reporter import Reporter
@@ -64,6 +65,8 @@ def findings(
     """Each fault as soon as it shows. begin : called with the form and the name of each problem before it."""
     try:
         taken = factory().forms
+    except InputError:
+        raise
     except (Exception, SystemExit) as error:
         yield _raised("any", "constructor", error)
         return

@@ -13,7 +13,6 @@ from harness.measurement.monitored_call import Monitored
 from harness.measurement.solver_descriptions import IMPORT_S, refuse_unimportable
 from harness.terminal import DONE, FAILED
 from harness.terminal.console import ConsoleReporter
-from problems.errors import InputError
 from problems.reporter import SILENT, Reporter
 from report.document.numbers import counted
 from solvers.base import Form, Solver
@@ -64,12 +63,6 @@ def check_here(job: tuple[str, Path | None], events: Events) -> None:
     def begin(form: Form, problem: str) -> None:
         events.report(phase="the test", form=form, problem=problem)
 
-    try:
-        factory()
-    except InputError:
-        raise
-    except BaseException:  # a finding of its own below
-        pass
     for finding in findings(factory, begin=begin):
         events.report(finding={name: text[:LONGEST_TEXT] for name, text in asdict(finding).items()})
 

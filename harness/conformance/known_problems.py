@@ -75,7 +75,7 @@ def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> 
 
 
 def known_problems(form: Form = "dual") -> list[KnownProblem]:
-    """One contact; two parts and a rigid tool. Arrays are read-only as in a measurement."""
+    """One contact; two parts and a rigid tool."""
     random = np.random.default_rng(0)
     made = []
     for name, pairs, tools in (("one contact", 1, 0), ("two parts and a tool", 30, 10)):
@@ -84,14 +84,12 @@ def known_problems(form: Form = "dual") -> list[KnownProblem]:
             near = (np.triu(np.tril(K, 3), -3) + DOMINANT * np.eye(len(K)) for K in blocks)
             blocks = [sp.csc_array(K) for K in near]
         prepared = Prepared(Assembly(Stiffness.of(*blocks), contact_rows(pairs, tools)))
-        for array in arrays_of(prepared):
-            array.flags.writeable = False
         cases = tuple(known_case(random, prepared, closed, title) for title, closed in CLOSED.items())
         made.append(KnownProblem(name, prepared, cases))
     return made
 
 
 def arrays_of(prepared: Prepared) -> list[NDArray[Any]]:
-    """Those that a solver is given, but for the loads."""
+    """The arrays that a solver is given, but for the loads."""
     A = prepared.assembly.A
     return [*in_form(prepared, prepared.form).arrays, A.data, A.indices]

@@ -20,25 +20,12 @@ from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.errors import InputError
 from problems.forms import Form
-from problems.reporter import Stage
 from problems.scene_files import read_scene
 
 from . import allowed_gap, mesh_error
 from .answer_record import arrays_of, is_of_plates, recorded
 from .solution import solve as solved
 from .validate import print_unusual
-
-
-class _Builds(ConsoleReporter):
-    """Keeps in mind which stages were made."""
-
-    def __init__(self, console: Console) -> None:
-        super().__init__(console)
-        self.stages = set[Stage]()
-
-    def building(self, stage: Stage, fraction: float = 0.0, part: str = "") -> None:
-        self.stages.add(stage)
-        super().building(stage, fraction, part)
 
 
 def solve(
@@ -67,7 +54,7 @@ def solve(
         allowed = "left out: the mesh of superelements and of given matrices is not known here"
         raise InputError.one("--refine", "scene", scene.name, allowed)
     print_unusual(scene, console)
-    reporter = _Builds(console)
+    reporter = ConsoleReporter(console)
     solution = solved(
         scene, solver, form=form, tolerance=tolerance, limit_s=reference_limit_s, reporter=reporter
     )

@@ -1,4 +1,4 @@
-"""Checks a scene without solving it: what will be built, its size and memory; the digits of a given K."""
+"""Checks a scene without solving it: its parts and effects, its size and memory, the digits of a given K."""
 
 from __future__ import annotations
 
@@ -20,9 +20,7 @@ from problems.build import model_of, prepared
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
-from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
-from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
 from report.document.numbers import counted
@@ -57,11 +55,6 @@ def validate(source: str, console: Console) -> None:
     console.print(f"One load case is solved in the {form} form, unless another is asked for.")
     if size.m == 0:
         console.print("No contact: a linear solve, without a quadratic program.")
-    if any(scene.effects_of(SpringEffect)):
-        console.print("Springs join parts into larger blocks of K.")
-    beyond = [effect.kind for effect in scene.effects_of(PartLoadEffect)]
-    if beyond:
-        console.print(f"Loads beyond the junction are condensed once: {', '.join(beyond)}.")
 
 
 def _matrices(scene: Scene, console: Console) -> None:
@@ -134,7 +127,7 @@ def print_facts(name: str, assembly: Assembly, console: Console) -> None:
 
 
 def digits_of(assembly: Assembly) -> int:
-    """The fewest digits that the entries of a block of K seem to have, at most 16."""
+    """The digits that the entries of K seem to have, at most 16: the fewest of a block."""
     return min(apparent_digits(K.data if sp.issparse(K) else K) for K in assembly.K.matrices)
 
 

@@ -1,4 +1,4 @@
-"""What the terminal shows, and the exit codes of the commands, as docs/commands.md and help texts state them.
+"""The output of commands in a terminal, and their exit codes, as docs/commands.md and help texts state them.
 
 FAILED: the command ran, but accuracy was lost, a solver has faults, or measurements are missing.
 GAP_EXCEEDED: the answer is good, and the gap that it leaves is larger than allowed.

@@ -24,7 +24,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 from harness.results.records import Row
-from problems.reporter import Reporter
+from problems.reporter import Reporter, Stage
 
 from . import DONE, GAP_EXCEEDED, NOTHING_JUDGED, READER_GONE
 
@@ -53,14 +53,14 @@ class PlainConsole(Console):
         raise SystemExit(READER_GONE)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """As in rich; here already, because the widths of a table's columns are measured before `render`.
+        """Make a string one line, so that no title or file name can pass for a line of ours.
 
-        A string is one line, so that no title or file name can pass for a line of ours.
+        Here, too, because the widths of a table's columns are measured before `render`.
         """
         return super().render_str(legible(text).replace("\n", UNKNOWN), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """As in rich, whose own control sequences are marked as such or made from styles afterwards."""
+        """Replace control characters; those of rich are marked as such, or made from styles afterwards."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=legible(segment.text))
 
@@ -68,11 +68,12 @@ class PlainConsole(Console):
 class ConsoleReporter(Reporter):
     """A line with the step, its progress and its seconds, gone when the step is over; sentences stay.
 
-    plain : without a terminal, each progress is a line that stays.
+    plain : without a terminal, each progress is a line that stays. stages : those that were made.
     """
 
     def __init__(self, console: Console, plain: bool = False) -> None:
         self.console, self.plain = console, plain and not console.is_terminal
+        self.stages = set[Stage]()
         text = TextColumn("{task.fields[name]}{task.description}", markup=False)
         columns = SpinnerColumn(), text, TimeElapsedColumn()
         hidden = not console.is_terminal
@@ -92,6 +93,10 @@ class ConsoleReporter(Reporter):
             self.console.print(text)
         for task in self.line.task_ids:
             self.line.update(task, description=f": {_with_share(text, fraction)}")
+
+    def building(self, stage: Stage, fraction: float = 0.0, part: str = "") -> None:
+        self.stages.add(stage)
+        super().building(stage, fraction, part)
 
     def say(self, sentence: str) -> None:
         self.console.print(f"{sentence}.", style="yellow", soft_wrap=True)

@@ -24,6 +24,7 @@ from harness.terminal.console import legible
 from .judge import Judgement
 
 SUITE = "rivetbench gate"
+JUDGED = ("verdict", "displacement_error_mm", "reference_bound_mm")  # of a finding, in JSON
 MARGIN = 10.0  # by which an error may exceed the baseline's
 
 
@@ -99,9 +100,7 @@ def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: i
             {
                 "key": finding.key,
                 "passed": finding.passed,
-                "verdict": finding.judgement.verdict,
-                "displacement_error_mm": finding.judgement.displacement_error_mm,
-                "reference_bound_mm": finding.judgement.reference_bound_mm,
+                **{name: getattr(finding.judgement, name) for name in JUDGED},
                 "limit_mm": finding.limit_mm,
                 "baseline_mm": finding.baseline_mm,
                 "why": finding.why,

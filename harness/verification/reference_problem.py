@@ -149,12 +149,10 @@ def reference_problem(
 def record(problem: ReferenceProblem, directory: Path) -> None:
     """Put the scene into DIRECTORY/problems.jsonl and its contacts into DIRECTORY/scenes/NAME.npz.
 
-    The facts of a reference in the sparse form are under `sparse`, with the largest difference between its x
-    and that of the condensed matrices, if both were made.
+    The facts of a reference in the sparse form are under `sparse`.
     """
     scene, assembly, reference = problem.scene, problem.prepared.assembly, problem.reference
-    facts, x = problem.prepared.facts, assembly.at_junction(reference.x)
-    contacts = directory / "scenes" / (scene.name.replace("/", "_") + ".npz")
+    facts = problem.prepared.facts
     of_family: dict[str, Any] = {
         "build_s": facts.get("seconds"),
         "stored_mib": problem.prepared.stored_mib,
@@ -183,17 +181,16 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
         row = (earlier or row) | {"sparse": sparse | {"unknowns": assembly.n, **of_family}}
     elif sparse:
         row["sparse"] = sparse
-    if earlier and (problem.form == "sparse") != bool(sparse) and "from_condensed_mm" not in sparse:
-        with suppress(OSError, KeyError, ValueError), np.load(contacts) as other_family:
-            row["sparse"]["from_condensed_mm"] = float(abs(other_family["x"] - x).max())
     _put(row, directory)
-    gap = problem.load.g - assembly.A.T @ reference.x
-    arrays = {"x": x, "gap_before": problem.load.g, "gap_after": gap, "lam": reference.lam}
+    x, g = reference.x, problem.load.g
+    arrays = {"x": assembly.at_junction(x), "lam": reference.lam}
+    arrays |= {"gap_before": g, "gap_after": g - assembly.A.T @ x}
     if assembly.contact_nodes is not None:
         arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(scene, JointScene):
         arrays["fasteners"] = scene.marks()
-    records.replace_arrays(contacts, arrays)
+    name = scene.name.replace("/", "_")
+    records.replace_arrays(directory / "scenes" / f"{name}.npz", arrays)
 
 
 def record_refusal(scene: Scene, directory: Path) -> None:
