@@ -21,7 +21,7 @@ from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import opened
 from problems.errors import InputError
 from problems.forms import FORMS, Form
-from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Vector
 from problems.forms.prepared import dual_alone
 from problems.forms.problem import in_form
 from problems.input.matrix_entries import SYMMETRY, contradictions
@@ -180,7 +180,7 @@ def solve_dual(
         raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
     name, chosen = solver_named(solver, options)
     form = form_of(name, chosen.forms, "dual")
-    return forces_of(name, chosen, in_form(dual_alone(Q), form), LoadCase(0 * p, -p), tolerance)
+    return forces_of(name, chosen, in_form(dual_alone(Q), form), DualLoadCase(0 * p, -p, p), tolerance)
 
 
 def solve_series(

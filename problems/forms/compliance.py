@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.dense_block import product
 from problems.stiffness.operator import Stiffness
 
@@ -89,8 +90,7 @@ def of_dense(Q: DenseCompliance, nodes: Matrix | None) -> ApproximateInverse:
         M = banded_inverse(Q.Q, windows)
         if _contracts(M, Q):
             return ApproximateInverse(M, diagonal)
-    whole = of_windows(Windows(np.arange(m), m), lambda _: np.array(Q.Q, order="F"))
-    return ApproximateInverse(whole, diagonal)
+    return ApproximateInverse(banded_inverse(Q.Q, Windows(np.arange(m), m)), diagonal)
 
 
 def of_products(assembly: Assembly, Q: ComplianceProducts, like: ComplianceProducts) -> ApproximateInverse:
@@ -151,10 +151,9 @@ def _along_bands(assembly: Assembly) -> Windows:
         return Windows.of(assembly.contact_nodes, assembly.m)
     places, widest = np.arange(assembly.n), 1
     for block, rows in zip(assembly.K.blocks, assembly.K.slices, strict=True):
-        if block.band is not None:
-            width, order = block.band
-            widest = max(widest, width + 1)
-            if order is not None:
-                places[rows.start + order] = np.arange(rows.start, rows.stop)
+        if isinstance(block, BandedBlock):
+            widest = max(widest, block.width + 1)
+            if block.order is not None:
+                places[rows.start + block.order] = np.arange(rows.start, rows.stop)
     first = places[assembly.A.indices[assembly.A.indptr[:-1]]]
     return Windows(np.argsort(first, kind="stable"), max(1, assembly.m * widest // assembly.n))

@@ -187,6 +187,5 @@ class _Scaled(Prepared):
 
 def dual_alone(Q: Matrix) -> Prepared:
     """Q (m, m) mm/N without a joint: the dual program of K = Q⁻¹ and A = I, for loads with p = −g."""
-    from problems.stiffness.dense_block import InverseBlock  # of this only
-
-    return Prepared(Assembly(Stiffness([InverseBlock(Q)]), sp.eye_array(len(Q), format="csc")), Q)
+    one = sp.eye_array(len(Q), format="csc")
+    return Prepared(Assembly(Stiffness.of(Stiffness.of(Q).compliance(one)), one), Q)

@@ -46,10 +46,6 @@ class BandedBlock(SparseBlock):
         return [self.L]
 
     @property
-    def band(self) -> tuple[int, Indices | None]:
-        return self.width, self.order
-
-    @property
     def factor_nonzeros(self) -> int:
         return self.size * (self.width + 1)
 

@@ -43,11 +43,6 @@ class Block(ABC):
         return np.asarray(self.matrix.diagonal())
 
     @property
-    def band(self) -> tuple[int, Indices | None] | None:
-        """The half-bandwidth, and the unknowns in the order of the band (None: as they are); None without."""
-        return None
-
-    @property
     @abstractmethod
     def arrays(self) -> list[NDArray[Any]]:
         """The arrays that hold the block."""

@@ -129,32 +129,6 @@ class DenseBlock(Block):
         return float(1 / smallest_inverse), float(largest)
 
 
-class InverseBlock(DenseBlock):
-    """K known by its inverse: K⁻¹ = Q. Q (size, size) symmetric positive definite, mm/N."""
-
-    def __init__(self, Q: Matrix) -> None:
-        self.Q = Q
-
-    @cached_property
-    def matrix(self) -> Matrix:
-        """K, by a Cholesky factor of Q. Raises NotPositiveDefinite."""
-        return mirrored(sla.cho_solve((cholesky(self.Q), False), np.eye(len(self.Q), order="F")))
-
-    @property
-    def size(self) -> int:
-        return len(self.Q)
-
-    @property
-    def arrays(self) -> list[NDArray[Any]]:
-        return [self.Q]
-
-    def factor(self) -> list[NDArray[Any]]:
-        return []
-
-    def solve(self, b: Matrix) -> Matrix:
-        return self.Q @ b
-
-
 def product(G: Matrix, v: Matrix) -> Matrix:
     """G v for G symmetric, column-major, v (m,) or (m, k). A single column reads one triangle of G, or only
     the columns of G where v is nonzero.
