@@ -20,6 +20,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from PIL import Image
 
@@ -27,11 +28,13 @@ from harness.planning.suite import read_suite
 from harness.results import records, series_file
 from harness.results.answer_files import pack
 from harness.results.provenance import ROOT, commit
+from harness.results.schema import OWNERS, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
-from harness.results.schema import VERDICTS
 from harness.terminal import INTERRUPTED
+from report.analysis.standings import of_fastest
 from report.results.reader import read
-from report.sections.time_to_solution import how_fast_table, in_series, ours_and_others
+from report.sections.series_throughput import compared
+from report.sections.time_to_solution import against_ours, how_fast_table, ours_and_others
 from studies.paper.__main__ import write as write_study
 
 PUBLISHED = ROOT / "results" / "published"
@@ -58,6 +61,7 @@ COLOURS = 256
 LONGEST_PAUSE_S = 1200.0
 
 Rows = Sequence[Mapping[str, Any]]
+IN_SERIES = "one of many load cases, ours with its proof"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -200,6 +204,24 @@ def _how_fast(folder: Path) -> str:
         tables.append(in_series(rows[rows["threads"] == rows["threads"].max()], proven))
     table = pd.concat([pd.DataFrame(), *tables])
     return "" if table.empty else f"\n## How fast is it?\n\n{how_fast_table(table).markdown}\n"
+
+
+def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.DataFrame:
+    """Lines as `ours_and_others` makes them, for one of many load cases: the seconds of a later one if the
+    solver has an update or a warm start, else of the first.
+
+    rows : of suite `series`. proven : by scene, the seconds of each case of ours, the proof of its error
+    included; `seconds_most` is the slowest case. Libraries and textbook methods prove nothing.
+    """
+    lines = []
+    for scene, seconds in proven.items():
+        of_scene = compared(rows[(rows["scene"] == scene) & rows["case"].notna()])
+        fastest = {owner: of_fastest(owner, of_scene, "later_s", "cold_s").min() for owner in OWNERS[1:]}
+        line = {"question": IN_SERIES, "n": of_scene["n"].min()}
+        lines.append(line | against_ours(pd.DataFrame([{"ours": seconds.mean()} | fastest])))
+        lines[-1] |= {"seconds_most": seconds.max()}
+        lines[-1] |= dict.fromkeys({*OWNERS[1:]} - {*of_scene["owner"]}, np.nan)
+    return pd.DataFrame(lines)
 
 
 def _seconds(series: Path) -> pd.Series[float]:

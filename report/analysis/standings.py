@@ -171,18 +171,6 @@ def recommended(
     return line
 
 
-def timed(cells: pd.DataFrame) -> pd.DataFrame:
-    """With `at_least`: seconds per load case if the answer is within the limit; for a run ended by the time
-    limit or an iteration limit, the time it had taken by then; else missing. `cut`: it is only that lower
-    bound.
-    """
-    within = cells["verdict"] == "within"
-    late = (cells["status"] == "time_limit") & ~within
-    spent = (cells["status"] == "iteration_limit") & ~within
-    at_least = cells["load_case_s"].where(within | spent, cells["time_limit_s"].where(late))
-    return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
-
-
 def seconds_text(cell: Mapping[str, Any]) -> str:
     """The seconds per load case, or why there is no answer within the limit."""
     if cell["verdict"] == "within":

@@ -1,8 +1,8 @@
 """Maps of the junction: fields on its nodes in true proportions, with outlines of some of them and marks.
 
-Scales are linear, or those of the square root, so that small values are visible; their labels say so. All
-sizes of a sheet are known in advance: a layout engine would find them by drawing every label several times,
-which takes longer than the picture.
+Scales are linear, or square roots, so that small values are visible; their labels say so. All sizes of a
+sheet are known in advance: a layout engine would draw every label several times to find them, which takes
+longer than the picture.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from . import style
 
 Array = NDArray[np.float64]
 Grid = tuple[Array, Array, NDArray[np.intp]]
+Outlines = Sequence[tuple[NDArray[np.bool_], str, str]]  # a mask, its colour, its name in the legend
 Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
 
 #: Shapes of the marks; other kinds are crosses. More than MANY of a kind are small dots, which hide nothing.
@@ -54,53 +55,55 @@ class Scale:
 
 def rooted(label: str, colours: str, *values: Array) -> Scale:
     """The scale of the square root from 0, or the least value if negative, to the largest."""
-    low = min(0.0, *(float(np.nanmin(each, initial=0.0)) for each in values))
-    high = max(float(np.nanmax(each, initial=low)) for each in values)
+    low = min(0.0, *(float(np.nanmin(field, initial=0.0)) for field in values))
+    high = max(float(np.nanmax(field, initial=low)) for field in values)
     return Scale(f"{label}\n(√ scale)", colours, PowerNorm(0.5, low, high if high > low else low + 1.0))
 
 
 @dataclass(frozen=True)
 class Map:
-    """A field on `nodes`. outlines : which nodes, in what colour, and what they are."""
+    """A field on `nodes`, with outlines of some of them."""
 
     title: str
     nodes: Array
     values: Array
     scale: Scale
-    outlines: Sequence[tuple[NDArray[np.bool_], str, str]] = ()
+    outlines: Outlines = ()
     marks: Marks = field(default_factory=dict)
 
 
 def drawn(maps: Sequence[Map], beside: int, corners: Array | None = None) -> tuple[Figure, list[Axes]]:
-    """A sheet of maps, `beside` of them in a row, with a colour bar for each scale. corners : points that
-    every map shows; by default all nodes.
+    """A sheet of maps with a colour bar for each scale, and a legend of the marks. Maps of a wide strip are
+    stacked, of an upright one all side by side, of another region `beside` and at most three per row.
+
+    corners : points that every map shows; by default all nodes.
     """
     entries = {
-        *(kind for each in maps for kind in each.marks),
-        *(o[2] for each in maps for o in each.outlines),
+        *(kind for item in maps for kind in item.marks),
+        *(o[2] for item in maps for o in item.outlines),
     }
-    scales = list(dict.fromkeys(each.scale for each in maps))
-    shown = np.concatenate([each.nodes for each in maps]) if corners is None else corners
-    page = _sheet(shown, [each.title for each in maps], beside, len(entries), len(scales))
-    found: dict[Scale, ScalarMappable] = {}
-    for axes, each in zip(page.axes, maps, strict=True):
-        found[each.scale] = draw(axes, each.nodes, each.values, each.scale)
-        for inside, colour, label in each.outlines:
-            _outlined(axes, each.nodes, inside, colour, label)
-        _marked(axes, each.marks)
-    return page.finished(*((found[scale], scale.label) for scale in scales)), page.axes
-
-
-def _sheet(nodes: Array, titles: list[str], beside: int, marks: int, bars: int) -> Sheet:
-    """Maps of the bounding box of the nodes: stacked if it is a wide strip, all side by side if it is
-    upright, else `beside` and at most three per row.
-    """
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
-    thin = THINNEST * (high - low).max() or 1.0
-    size, middle = np.maximum(high - low, thin), (low + high) / 2
+    scales = list(dict.fromkeys(item.scale for item in maps))
+    shown = np.concatenate([item.nodes for item in maps]) if corners is None else corners
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    size, middle = np.maximum(high - low, THINNEST * (high - low).max() or 1.0), (low + high) / 2
     ratio = size[1] / size[0]
-    columns = 1 if ratio < NARROW else len(titles) if ratio > UPRIGHT else min(beside, 3)
-    return sheet(middle - size / 2, middle + size / 2, titles, columns, marks, bars)
+    columns = 1 if ratio < NARROW else len(maps) if ratio > UPRIGHT else min(beside, 3)
+    titles = [item.title for item in maps]
+    sheet, panels, bars, ncols = _sheet(middle, size, titles, columns, len(entries), len(scales))
+    colours: dict[Scale, ScalarMappable] = {}
+    named: dict[str, Any] = {}
+    for axes, item in zip(panels, maps, strict=True):
+        colours[item.scale] = _field(axes, item.nodes, item.values, item.scale)
+        for inside, colour, label in item.outlines:
+            _outlined(axes, item.nodes, inside, colour, label)
+        _marked(axes, item.marks)
+        handles, labels = axes.get_legend_handles_labels()
+        named |= dict(zip(labels, handles, strict=True))
+    for bar, scale in zip(bars, scales, strict=True):
+        sheet.colorbar(colours[scale], cax=bar, label=scale.label)
+    if named:
+        sheet.legend(named.values(), named.keys(), loc="lower left", ncols=ncols)
+    return sheet, panels
 
 
 def grid_of(nodes: Array) -> Grid | None:
@@ -112,8 +115,8 @@ def grid_of(nodes: Array) -> Grid | None:
     return (x, y, place) if full else None
 
 
-def draw(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappable:
-    """A field on the nodes: cells if they are a grid, otherwise dots."""
+def _field(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappable:
+    """Draw a field on the nodes: as cells if they are a grid, otherwise as dots."""
     axes.set(aspect="equal", ylabel="y, mm")
     axes.grid(visible=False)
     look: dict[str, Any] = {"norm": scale.norm, "cmap": scale.colours}
@@ -128,33 +131,31 @@ def draw(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappabl
 
 
 def _outlined(axes: Axes, nodes: Array, inside: NDArray[np.bool_], colour: str, label: str) -> None:
-    """The border of some contacts, or a ring around each off a grid, dark-rimmed to show on any colour."""
+    """Draw the border of some contacts, or a ring around each off a grid, dark-rimmed on any colour."""
+    if not inside.any():
+        return
     grid = grid_of(nodes)
-    if grid is None and inside.any():
-        ring: dict[str, Any] = {"marker": "o", "markersize": RING, "linestyle": "", "markerfacecolor": "none"}
-        if colour != RIM:
-            ring["path_effects"] = [withStroke(linewidth=1.7, foreground=RIM)]
-        axes.plot(*nodes[inside].T, markeredgecolor=colour, markeredgewidth=0.9, label=label, **ring)
-    if grid and inside.any():
-        look: dict[str, Any] = {"linewidth": 0.9}
-        if colour != RIM:
-            look["path_effects"] = [withStroke(linewidth=1.7, foreground=RIM)]
-        axes.add_collection(LineCollection(outline(grid, inside), color=colour, **look))
-        axes.plot([], [], color=colour, label=label, **look)
+    look: dict[str, Any] = (
+        {} if colour == RIM else {"path_effects": [withStroke(linewidth=1.7, foreground=RIM)]}
+    )
+    if grid is None:
+        look |= {"marker": "o", "markersize": RING, "linestyle": "", "markerfacecolor": "none"}
+        axes.plot(*nodes[inside].T, markeredgecolor=colour, markeredgewidth=0.9, label=label, **look)
+    else:
+        axes.add_collection(LineCollection(outline(grid, inside), color=colour, linewidth=0.9, **look))
+        axes.plot([], [], color=colour, label=label, linewidth=0.9, **look)
 
 
 def _marked(axes: Axes, marks: Marks) -> None:
-    """Rings with a white rim, visible on any colour without hiding what is inside them; dots if they are
-    many.
-    """
+    """Draw rings with a white rim, which show on any colour and hide nothing; dots if they are many."""
     for kind, points in marks.items():
         x, y = np.array(points).T
         many = len(points) > MANY
         look: dict[str, Any] = {"linestyle": "", "clip_on": False, "markerfacecolor": "none"}
         look |= {"marker": "." if many else SHAPES.get(kind, "x"), "markersize": 3.0 if many else 4.5}
         axes.plot(x, y, markeredgecolor="#FFFFFF90", markeredgewidth=1.2 if many else 1.6, **look)
-        width = 0.6 if many else 1.0
-        axes.plot(x, y, markeredgecolor=MARK, markeredgewidth=width, label=kind.replace("_", " "), **look)
+        look |= {"markeredgecolor": MARK, "markeredgewidth": 0.6 if many else 1.0}
+        axes.plot(x, y, label=kind.replace("_", " "), **look)
 
 
 def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
@@ -176,31 +177,16 @@ def _edges(nodes: Array) -> Array:
     return np.concatenate([nodes[:1], (nodes[1:] + nodes[:-1]) / 2, nodes[-1:]])
 
 
-@dataclass(frozen=True)
-class Sheet:
-    figure: Figure
-    axes: list[Axes]
-    bars: list[Axes]
-    legend_columns: int
+def _sheet(
+    middle: Array, size: Array, titles: list[str], columns: int, marks: int, bars: int
+) -> tuple[Figure, list[Axes], list[Axes], int]:
+    """A figure with an empty map of one region for each title, row by row, the axes of its colour bars, and
+    the columns of its legend. The outer maps have tick labels.
 
-    def finished(self, *scales: tuple[ScalarMappable, str]) -> Figure:
-        """The sheet with a labelled colour bar for each scale, and a legend of the labelled marks."""
-        for bar, (drawn, label) in zip(self.bars, scales, strict=True):
-            self.figure.colorbar(drawn, cax=bar, label=label)
-        found = [axes.get_legend_handles_labels() for axes in self.axes]
-        named = {text: mark for marks, texts in found for mark, text in zip(marks, texts, strict=True)}
-        if named:
-            self.figure.legend(named.values(), named.keys(), loc="lower left", ncols=self.legend_columns)
-        return self.figure
-
-
-def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int, bars: int = 1) -> Sheet:
-    """An empty map of one region for each title, row by row; the outer ones have tick labels.
-
-    low, high : the region's corners (x, y), mm. marks : the number of legend entries. bars : of scales.
+    middle, size : of the region, (x, y), mm. marks : the number of legend entries.
     """
     rows, beside = -(-len(titles) // columns), bars * RIGHT
-    ratio = (high[1] - low[1]) / (high[0] - low[0])
+    ratio = size[1] / size[0]
     room = (style.WIDTH - LEFT - beside - (columns - 1) * BESIDE) / columns
     width = min(room, TALLEST / ratio)
     height = width * ratio
@@ -214,14 +200,15 @@ def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int, 
     tall = TOP + bar + BOTTOM + -(-marks // legend_columns) * LINE
     figure = Figure(figsize=(wide, tall))
 
-    def placed(left: float, bottom: float, width: float, height: float) -> Axes:
-        return figure.add_axes((left / wide, bottom / tall, width / wide, height / tall))
+    def placed(x: float, bottom: float, width: float, height: float) -> Axes:
+        return figure.add_axes((x / wide, bottom / tall, width / wide, height / tall))
 
     maps = []
     for k, title in enumerate(titles):
         row, column = divmod(k, columns)
         axes = placed(LEFT + column * across, tall - top - row * down - height, width, height)
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, mm", ylabel="y, mm")
+        (west, south), (east, north) = middle - size / 2, middle + size / 2
+        axes.set(xlim=(west, east), ylim=(south, north), xlabel="x, mm", ylabel="y, mm")
         axes.set_title(title, y=1.0)  # a given place spares a search for it
         axes.xaxis.set_label_coords(0.5, -NAME_BELOW / height)
         axes.yaxis.set_label_coords(-NAME_LEFT / width, 0.5)
@@ -233,5 +220,5 @@ def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int, 
         axes.xaxis.label.set_visible(last)
         maps.append(axes)
     right = LEFT + (columns - 1) * across + width
-    lefts = [right + FROM_MAPS + k * RIGHT for k in range(bars)]
-    return Sheet(figure, maps, [placed(left, tall - TOP - bar, BAR, bar) for left in lefts], legend_columns)
+    places = [right + FROM_MAPS + k * RIGHT for k in range(bars)]
+    return figure, maps, [placed(x, tall - TOP - bar, BAR, bar) for x in places], legend_columns

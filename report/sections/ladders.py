@@ -25,7 +25,7 @@ from report.results.rows import in_order
 CORRECT, CORRECT_UNCLAIMED = "correct, reported solved", "correct, not reported solved"
 WRONG_UNCLAIMED, WRONG_CLAIMED = "wrong, not reported solved", "wrong, reported solved"
 NO_ANSWER, UNJUDGED = "no answer", "cannot be judged"
-#: By verdict, and whether the solver reported it as solved. Correct: within the row's limit.
+#: The outcome by verdict, and by whether the solver reported it as solved. Correct: within the row's limit.
 OUTCOMES = {
     ("within", True): CORRECT,
     ("within", False): CORRECT_UNCLAIMED,
@@ -51,7 +51,7 @@ LOOKS = {
 WRONG = (WRONG_UNCLAIMED, WRONG_CLAIMED)
 LARGEST = 1e99  # times the limit: the cell has room for two digits
 
-#: What the rungs of a ladder count, and its unit.
+#: The quantity that the rungs of a ladder count, and its unit.
 COUNTED = {
     "coincident": "tie, N/mm",
     "conditioning": "cond(K)",
@@ -113,16 +113,11 @@ def ladder_map(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[st
         Group(name, {f"{name}/{rung}": rung for rung in rungs}, COUNTED.get(name, ""))
         for name, rungs in ladders.items()
     ]
-    found = {(cell["label"], f"{cell['ladder']}/{cell['rung']}"): _cell(cell) for cell in records(cells)}
-    drawing = grid({label: label for label in order}, groups, found, ROW, WIDEST)
+    squares = {(cell["label"], f"{cell['ladder']}/{cell['rung']}"): _cell(cell) for cell in records(cells)}
+    drawing = grid({label: label for label in order}, groups, squares, ROW, WIDEST)
+    edge: dict[str, Any] = {"edgecolor": "#888888", "linewidth": 0.5}
     handles = [
-        Patch(
-            facecolor=look.face,
-            hatch=look.hatch,
-            edgecolor="#888888",
-            linewidth=0.5,
-            label=f"{name} {look.text}",
-        )
+        Patch(facecolor=look.face, hatch=look.hatch, label=f"{name} {look.text}", **edge)
         for name, look in LOOKS.items()
     ]
     drawing.set_figheight(drawing.get_figheight() + LEGEND)
@@ -169,14 +164,14 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
 
 
 def rungs(results: Results) -> Section | None:
-    """The rungs themselves, and what the model rejects."""
+    """The rungs themselves, and the input that the model rejects."""
     if results.cells.empty or "scene" not in results.problems:
         return None
-    known = results.problems[results.problems["scene"].str.startswith(LADDERS)]
-    known = known.drop_duplicates("scene", keep="last").reset_index(drop=True)
+    problems = results.problems[results.problems["scene"].str.startswith(LADDERS)]
+    problems = problems.drop_duplicates("scene", keep="last").reset_index(drop=True)
     limits = results.rows.groupby("scene")["limit_mm"].max()
     names = ("n", "m", "active", "cond_K", "reference_bound_mm")
-    taken = known[known["scene"].isin(limits.index)].reindex(columns=["scene", "title", *names])
+    taken = problems[problems["scene"].isin(limits.index)].reindex(columns=["scene", "title", *names])
     taken = taken.assign(**{name: taken[name].map(as_number).astype(float) for name in names})
     taken["limit_mm"] = taken["scene"].map(limits)
     columns = [word("rung", "scene"), word("description", "title")]
@@ -189,8 +184,8 @@ def rungs(results: Results) -> Section | None:
     blocks: list[Block] = [
         Table("rungs", "*The measured rungs.* Bound 0: the reference is exact.", taken, columns)
     ]
-    if "refused" in known and known["refused"].notna().any():
-        refused = known.loc[known["refused"].notna(), ["scene", "title", "refused"]]
+    if "refused" in problems and problems["refused"].notna().any():
+        refused = problems.loc[problems["refused"].notna(), ["scene", "title", "refused"]]
         refused = refused.replace({"refused": {"": "**accepted, although the model does not cover it**"}})
         columns = [word("rung", "scene"), word("description", "title"), word("error message", "refused")]
         caption = (

@@ -19,7 +19,7 @@ PANEL = 3.0  # inches
 
 
 def section(results: Results) -> Section | None:
-    """Of each method with the best of its tolerances on each scene."""
+    """Every method with the best of its tolerances on each scene."""
     cells = results.cells[results.cells["status"] != "unsupported"].dropna(subset=["n", "tolerance"])
     if cells.empty or cells["case"].notna().any():  # load cases of a series have a section of their own
         return None

@@ -20,22 +20,17 @@ def section(results: Results) -> Section | None:
         return None
     rows = compared(rows)
     answered = rows["verdict"].isin(ANSWERED)
-    first, later = answered & (rows["warm"] == 0), answered & (rows["warm"] == 1)
     rows = rows.assign(
         within=rows["verdict"] == "within",
         error_mm=rows["displacement_error_mm"].where(answered),
-        first_s=rows["case_s"].where(first),
-        first_iterations=rows["iterations"].where(first),
-        later_iterations=rows["iterations"].where(later),
+        first_s=rows["case_s"].where(answered & (rows["warm"] == 0)),
     )
     groups = rows.groupby(CELL, dropna=False)
     lines = groups[["n", "searched", "owner"]].first().assign(cases=groups.size())
     lines["within"] = groups["within"].sum()
     lines["case_s"] = groups["later_s"].median()
-    lines["rate"] = 1 / lines["case_s"]
     lines["once_s"] = groups[["convert_s", "prepare_s"]].max().sum(axis=1)
-    middle = ["first_s", "first_iterations", "later_iterations"]
-    lines[middle] = groups[middle].median()
+    lines["first_s"] = groups["first_s"].median()
     lines[["batched", "error_mm"]] = groups[["batched", "error_mm"]].max()
     lines = named_by(lines.join(spreads(rows, CELL, ["to_library"])).reset_index(), ROUND)
     lines = lines.sort_values(["n", "scene", "threads", "case_s"])

@@ -1,4 +1,4 @@
-"""Time: of the machine, against contacts and size; of each method, with its products with Q, by scene."""
+"""Time of each method against contacts and size, products with Q by scene, and the speed of the machine."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def machine(results: Results) -> Section | None:
 
 
 def contacts(results: Results) -> Section | None:
-    """For sizes with several loads, as in the paper's Figures 5 to 7."""
+    """Time against the contacts, for sizes with several loads, as in the paper's Figures 5 to 7."""
     cells = best_tolerances(shown(results.cells))
     sizes = cells.groupby(["n", "m"], dropna=False)
     cells = cells[sizes["active"].transform("nunique") >= FEWEST]
@@ -72,7 +72,7 @@ def contacts(results: Results) -> Section | None:
 
 
 def scaling(results: Results) -> Section | None:
-    """Exponents in n for the scenes scaling/…, one joint on finer and finer grids."""
+    """Exponents in n for the scenes scaling/…, one joint on finer and finer meshes."""
     cells = best_tolerances(results.cells[results.cells["scene"].str.startswith("scaling/")])
     within = cells[cells["verdict"] == "within"].sort_values("n")
     if not cells["cholesky_s"].notna().any() or cells["n"].nunique() < FEWEST:
@@ -98,21 +98,21 @@ def scaling(results: Results) -> Section | None:
 
 
 def _exponents(method: object, cells: pd.DataFrame) -> dict[str, Any]:
-    """The exponent in n of each of GROWING and its text, without values that are too small."""
-    found: dict[str, Any] = {"method": method, "sizes": len(cells), "largest": cells["n"].max()}
+    """The exponent in n of each of GROWING, and its text. Values that are too small are left out."""
+    line: dict[str, Any] = {"method": method, "sizes": len(cells), "largest": cells["n"].max()}
     for name, (_, least) in GROWING.items():
         fit = exponent(cells["n"].tolist(), cells[name].where(cells[name] >= least).tolist())
-        found |= {name: fit and fit.slope, f"{name} shown": str(fit or "")}
-    return found
+        line |= {name: fit and fit.slope, f"{name} shown": str(fit or "")}
+    return line
 
 
 def _growth(within: pd.DataFrame) -> Drawing:
     styles = styles_of(within)
     drawing, panels = style.panels(2, 3.3, style.legend_entries(styles), sharex=True)
-    known = within.groupby("n")[["cholesky_s", "m"]].median().dropna()
+    sizes = within.groupby("n")[["cholesky_s", "m"]].median().dropna()
     limits = {
-        "load_case_s": (known["cholesky_s"], "one Cholesky of Q"),
-        "working_mib": (8 * known["m"] ** 2 / 2**20, "Q itself"),
+        "load_case_s": (sizes["cholesky_s"], "one Cholesky of Q"),
+        "working_mib": (8 * sizes["m"] ** 2 / 2**20, "Q itself"),
     }
     for axes, (name, limit) in zip(panels, limits.items(), strict=True):
         for method, look in styles.items():
@@ -138,7 +138,7 @@ BY_SCENE = (
 
 
 def methods(results: Results) -> Section | None:
-    """For results in which at least two methods count their products with Q."""
+    """Time and products with Q by scene, if at least two methods count their products."""
     cells = results.cells[results.cells["status"] != "unsupported"]
     cells = cells.assign(products=[_products(cell) for cell in records(cells)])
     if cells.loc[cells["products"].notna(), "solver"].nunique() < 2:

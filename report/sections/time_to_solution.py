@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Patch
 
 from harness.results.schema import OWNERS
-from report.analysis.standings import best_tolerances, of_fastest, seconds_text
+from report.analysis.standings import best_tolerances, seconds_text
 from report.analysis.time_to_solution import LOAD_CASES, STAGES, roads
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.escape import short
@@ -21,13 +21,10 @@ from report.figures import style
 from report.results.reader import Results
 from report.results.rows import in_order
 
-from .series_throughput import compared
-
 FROM_SCENE = "a load case, from the scene on"
 ONE_MORE = "one more load case on a known assembly"
-IN_SERIES = "one of many load cases, ours with its proof"
 MADE = ("model_s", "K_s", "factors_s", "Q_s")  # before the solver's own preparation
-#: Of each stage its name, colour and hatch.
+#: The name, colour and hatch of each stage.
 LOOKS = {
     "model_s": ("finite-element model", "#C9C9C9", None),
     "K_s": ("condensation", "#5A5A5A", None),
@@ -49,7 +46,7 @@ def how_fast(results: Results) -> Section | None:
 
 
 def how_fast_table(table: pd.DataFrame) -> Table:
-    """A table of lines from `ours_and_others` and `in_series`."""
+    """A table of lines as `ours_and_others` makes them."""
     columns = [
         word("question", "question"),
         number("n", "n", whole),
@@ -98,31 +95,15 @@ def ours_and_others(results: Results) -> pd.DataFrame:
     lines = []
     for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
         fastest = ways.groupby(["n", "scene", "owner"])[seconds].min().unstack("owner")
-        known = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
-        lines += [{"question": question, "n": n} | _line(of_size) for n, of_size in known.groupby("n")]
+        solved = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
+        lines += [
+            {"question": question, "n": n} | against_ours(of_size) for n, of_size in solved.groupby("n")
+        ]
     return pd.DataFrame(lines)
 
 
-def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.DataFrame:
-    """The same of many load cases: the seconds of one, of a later one if the solver has an update or a
-    warm start.
-
-    rows : of suite `series`. proven : by scene, the seconds of each case of ours, the proof of its error
-    included; `seconds_most` is the slowest case. Libraries and textbook methods prove nothing.
-    """
-    lines = []
-    for scene, seconds in proven.items():
-        of_scene = compared(rows[(rows["scene"] == scene) & rows["case"].notna()])
-        fastest = {owner: of_fastest(owner, of_scene, "later_s", "cold_s").min() for owner in OWNERS[1:]}
-        line = {"question": IN_SERIES, "n": of_scene["n"].min()}
-        lines.append(line | _line(pd.DataFrame([{"ours": seconds.mean()} | fastest])))
-        lines[-1] |= {"seconds_most": seconds.max()}
-        lines[-1] |= dict.fromkeys({*OWNERS[1:]} - {*of_scene["owner"]}, np.nan)
-    return pd.DataFrame(lines)
-
-
-def _line(fastest: pd.DataFrame) -> dict[str, Any]:
-    """fastest : seconds by scene and owner."""
+def against_ours(fastest: pd.DataFrame) -> dict[str, Any]:
+    """The figures of one question. fastest : seconds, a row per scene, a column per owner."""
     line: dict[str, Any] = {"scenes": len(fastest), "seconds": fastest["ours"].median()}
     line["seconds_most"] = fastest["ours"].max()
     for owner in OWNERS[1:]:
@@ -133,7 +114,7 @@ def _line(fastest: pd.DataFrame) -> dict[str, Any]:
 
 
 def section(results: Results) -> Section | None:
-    """In a run with sparse and dense forms."""
+    """Seconds of each stage, in a run with sparse and dense forms."""
     lines = roads(results)
     if lines.empty:
         return None
@@ -172,7 +153,7 @@ def _total(line: Mapping[str, Any], load_cases: int) -> str:
 
 
 def _at_the_ends(cells: pd.DataFrame) -> pd.DataFrame:
-    """Of each size the scenes with the fewest and the most active contacts."""
+    """The scenes of each size with the fewest and the most active contacts."""
     scenes = cells.drop_duplicates("scene").sort_values(["n", "active", "scene"]).groupby("n")["scene"]
     return cells[cells["scene"].isin([*scenes.first(), *scenes.last()])]
 
@@ -187,15 +168,15 @@ def _stacked(lines: pd.DataFrame) -> Drawing:
     drawing = style.figure(sum(heights) + 0.5)
     panels = drawing.subplots(len(scenes), 1, height_ratios=heights, squeeze=False)[:, 0]
     for axes, of in zip(panels, scenes, strict=True):
-        left = np.zeros(len(of))
+        ends = np.zeros(len(of))
         for name, (_, color, hatch) in LOOKS.items():
             look: Any = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.4}
-            axes.barh(np.arange(len(of)), of[name], left=left, height=0.74, **look)
-            left += of[name].to_numpy(dtype=float)
+            axes.barh(np.arange(len(of)), of[name], left=ends, height=0.74, **look)
+            ends += of[name].to_numpy(dtype=float)
         for place, line in enumerate(records(of)):
             at: Any = {"textcoords": "offset points", "va": "center", "fontsize": 8}
-            axes.annotate(significant(line["total_1_s"]), (left[place], place), (4, 0), **at)
-        axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of) - 0.5, -0.5))
+            axes.annotate(significant(line["total_1_s"]), (ends[place], place), (4, 0), **at)
+        axes.set(xlim=(0, 1.14 * ends.max()), ylim=(len(of) - 0.5, -0.5))
         axes.set_yticks(range(len(of)), [short(name, LONGEST) for name in of["method"]])
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")

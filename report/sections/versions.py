@@ -63,9 +63,9 @@ def _blocks(solver: str, cells: pd.DataFrame) -> list[Block]:
 
 
 def of_versions(results: Results) -> dict[str, pd.DataFrame]:
-    """Of each solver measured in several versions on one scene, its cells, version below version.
+    """The cells of each solver that was measured in several versions on one scene, version below version.
 
-    Adds `what`, the form and what else distinguishes measurements, and `group` and `change`, how a version
+    Adds `what`, a name of the measurement without scene and solver; `group` and `change`, how a version
     differs from the one above, as in a comparison of runs; missing for the first.
     """
     rows = results.rows[(results.rows["status"] != "unsupported") & (results.rows["solver_version"] != "")]
@@ -79,13 +79,13 @@ def of_versions(results: Results) -> dict[str, pd.DataFrame]:
 
 
 def _side_by_side(rows: pd.DataFrame) -> pd.DataFrame:
-    (_, before), *later = sorted(rows.groupby("solver_version"), key=lambda pair: _numbers(str(pair[0])))
-    parts = [cells_of(before, ["measurement"])]
-    for _, own in later:
-        change = compared(before, own, True, MAX_DIGITS_LOST, MAX_SLOWDOWN).set_index("measurement")
+    (_, older), *later = sorted(rows.groupby("solver_version"), key=lambda pair: _numbers(str(pair[0])))
+    parts = [cells_of(older, ["measurement"])]
+    for _, newer in later:
+        change = compared(older, newer, True, MAX_DIGITS_LOST, MAX_SLOWDOWN).set_index("measurement")
         change = change.loc[change["verdict_old"] != MISSING, ["group", "change"]]
-        parts.append(cells_of(own, ["measurement"]).join(change, on="measurement"))
-        before = pd.concat([before[~before["measurement"].isin(own["measurement"])], own])
+        parts.append(cells_of(newer, ["measurement"]).join(change, on="measurement"))
+        older = pd.concat([older[~older["measurement"].isin(newer["measurement"])], newer])
     lines = pd.concat(parts, ignore_index=True)
     order = {name: place for place, name in enumerate(rows["measurement"].unique())}
     return lines.sort_values("measurement", key=lambda names: names.map(order), kind="stable")

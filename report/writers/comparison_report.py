@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pandas as pd
 from report.analysis.checks import commits_text
 from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
 from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
-from report.document.escape import csv_frame, file_name
+from report.document.escape import file_name
 from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
 from report.page.write import Data, banner
 from report.page.write import write as write_page
@@ -30,12 +31,13 @@ ON_PAGE = (
     *("status_old", "status_new"),
 )
 TEXTS = ("measurement", "change", "verdict", "status")
+SIDES = ("old", "new")
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One run against an older one. untimed : a sentence that says why times are not compared, or ""; rows :
-    of both, with their `side`.
+    """One run against an older one. untimed : why times are not compared, a sentence, or ""; rows : of both,
+    with their `side`.
     """
 
     old: str
@@ -51,15 +53,16 @@ class Comparison:
     @property
     def summary(self) -> str:
         """'238 measurements: 3 worse, 5 better, 1 another status, 229 alike.'"""
-        found = self.table["group"].value_counts()
-        counts = [f"{found[group]} {group}" for group in dict.fromkeys(GROUPS) if group in found]
+        sizes = self.table["group"].value_counts()
+        counts = [f"{sizes[group]} {group}" for group in dict.fromkeys(GROUPS) if group in sizes]
         return f"{counted(len(self.table), 'measurement')}: {', '.join(counts)}. {self.untimed}".strip()
 
 
-def arrow(before: object, after: object, show: Any = significant) -> str:
-    """'1.2e-11 → 9.0e-8', or one figure if both are the same."""
-    one, other = show(before), show(after)
-    return one if one == other else f"{one} → {other}"
+def arrow(heading: str, name: str, show: Callable[[Any], str] = significant, align: str = "right") -> Column:
+    """A column of '1.2e-11 → 9.0e-8', or one figure if both sides are the same."""
+    return Column(
+        heading, lambda line: " → ".join(dict.fromkeys(show(line[f"{name}_{side}"]) for side in SIDES)), align
+    )
 
 
 def ratio_text(line: Mapping[str, Any]) -> str:
@@ -78,14 +81,12 @@ def digits_text(line: Mapping[str, Any]) -> str:
 COLUMNS = [
     word("measurement", "measurement"),
     word("change", "change"),
-    Column(
-        "error, mm", lambda line: arrow(line["error_mm_old"], line["error_mm_new"], lambda v: power(v, 2))
-    ),
+    arrow("error, mm", "error_mm", partial(power, digits=2)),
     Column("digits", digits_text),
-    Column("iterations", lambda line: arrow(line["iterations_old"], line["iterations_new"], whole)),
-    Column("seconds", lambda line: arrow(line["seconds_old"], line["seconds_new"])),
+    arrow("iterations", "iterations", whole),
+    arrow("seconds", "seconds"),
     Column("ratio of times", ratio_text),
-    Column("status", lambda line: arrow(line["status_old"], line["status_new"], str), "left"),
+    arrow("status", "status", str, "left"),
 ]
 SOLVERS = [
     word("solver", "solver"),
@@ -100,40 +101,35 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
     """Write the comparisons with one older run into the folder `out`, and return the path of the page."""
     out.mkdir(parents=True, exist_ok=True)
     sections = [Section("How to read this", [Text(NOTE)])]
-    for place, each in enumerate(comparisons, start=1):
-        blocks = _blocks(each.table, each.summary, f"{place}-" if len(comparisons) > 1 else "")
-        sections.append(Section(f"{each.old} → {each.new}", blocks))
-    every = pd.concat([each.table.assign(old=each.old, new=each.new) for each in comparisons])
-    csv_frame(every).to_csv(out / "comparison.csv", index=False)
+    for place, pair in enumerate(comparisons, start=1):
+        blocks = _blocks(pair, f"{place}-" if len(comparisons) > 1 else "")
+        sections.append(Section(f"{pair.old} → {pair.new}", blocks))
+    lines = pd.concat([pair.table.assign(old=pair.old, new=pair.new) for pair in comparisons])
     title = f"Compared with {comparisons[0].old}"
-    pairs = [(each.old, each.new, each.summary, each.table) for each in comparisons]
-    rows = pd.concat([each.rows for each in comparisons])
-    write_page(out / "index.html", title, comparison_data(pairs, rows))
-    return written(out / "comparison.md", title, sections)
+    write_page(out / "index.html", title, comparison_data(comparisons))
+    return written(out / "comparison.md", title, sections, files={"comparison": lines})
 
 
-def _blocks(table: pd.DataFrame, summary: str, prefix: str) -> list[Block]:
-    blocks: list[Block] = [Text(f"{summary} Every measurement: [comparison.csv](comparison.csv).")]
+def _blocks(pair: Comparison, prefix: str) -> list[Block]:
+    blocks: list[Block] = [Text(f"{pair.summary} Every measurement: [comparison.csv](comparison.csv).")]
     for group in (WORSE, CHANGED, BETTER):
-        if len(lines := table[table["group"] == group]):
+        if len(lines := pair.table[pair.table["group"] == group]):
             blocks.append(Table(f"{prefix}{file_name(group)}", f"*{group.capitalize()}.*", lines, COLUMNS))
-    solvers = by_solver(table)
-    if len(solvers):
+    if len(solvers := by_solver(pair.table)):
         blocks.append(Table(f"{prefix}solvers", "*Solver by solver.*", solvers, SOLVERS))
     return blocks
 
 
-def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]], rows: pd.DataFrame) -> Data:
-    """What the page of a comparison shows. pairs : old, new, summary, and the table of each; rows : of all
-    runs, with their `side`.
-    """
+def comparison_data(comparisons: list[Comparison]) -> Data:
+    """The data of the page."""
     return {
         "kind": "compare",
-        "banner": _banner(rows),
+        "banner": _banner(pd.concat([pair.rows for pair in comparisons])),
         "columns": [[name, name.replace("_", " "), not name.startswith(TEXTS)] for name in ON_PAGE],
         "comparisons": [
-            {"old": old, "new": new, "summary": summary, "lines": [_line(line) for line in records(table)]}
-            for old, new, summary, table in pairs
+            {name: getattr(pair, name) for name in ("old", "new", "summary")}
+            | {"lines": [_line(line) for line in records(pair.table)]}
+            for pair in comparisons
         ],
     }
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.standings import TIE, seconds_text, timed
+from report.analysis.standings import TIE, seconds_text
 from report.document.blocks import Column, Table
 from report.document.numbers import as_number, significant
 from report.results.reader import read
@@ -79,6 +79,18 @@ class Study:
         """Those with at least two scenes of METHODS."""
         scenes = {(r["n"], r["scene"]) for r in self.rows if r["method"] in METHODS}
         return sorted({int(n) for n, _ in scenes if sum(n == other for other, _ in scenes) > 1})
+
+
+def timed(cells: pd.DataFrame) -> pd.DataFrame:
+    """Cells with `at_least`: seconds per load case if the answer is within the limit; for a run ended by the
+    time limit or an iteration limit, the time it had taken by then; else missing. `cut` : whether it is only
+    that lower bound.
+    """
+    within = cells["verdict"] == "within"
+    late = (cells["status"] == "time_limit") & ~within
+    spent = (cells["status"] == "iteration_limit") & ~within
+    at_least = cells["load_case_s"].where(within | spent, cells["time_limit_s"].where(late))
+    return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
 
 
 def study(directory: Path) -> Study:

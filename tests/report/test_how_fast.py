@@ -8,7 +8,8 @@ import pytest
 from synthetic_results import results, row
 
 from report.sections import time_to_solution
-from report.sections.time_to_solution import FROM_SCENE, ONE_MORE, in_series, ours_and_others
+from report.sections.time_to_solution import FROM_SCENE, ONE_MORE, ours_and_others
+from studies.publish import in_series
 
 #: solver, form, owner, seconds to solve on scenes 0 and 1; None: outside the limit.
 LINES: list[tuple[str, str, str, tuple[float | None, float | None]]] = [
