@@ -69,13 +69,13 @@ def solve(
                 5 the two scenes have other contacts.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
-        from harness.scene.solve import solve as solve_scene
+        from harness.scene.solve import solve_into
         from harness.scene.two_scenes import solve_both
 
         taken: Any = form.value if form else None
 
         def solved(source: str, folder: Path) -> int:
-            return solve_scene(
+            return solve_into(
                 source, solver, tolerance, folder, console, reference_limit, taken, allow_gap, refine
             )
 

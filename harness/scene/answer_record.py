@@ -17,6 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from harness.results.provenance import machine, provenance, resident_mib
+from harness.verification.judge import LIMIT_MM
+from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, Vector
 from problems.model.effect import Effect, SpringEffect
 from problems.model.interface import AnyJoint
@@ -97,6 +99,23 @@ def _skipped(solution: Solution, built: set[Stage], solver: str | None) -> Itera
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
     elif is_of_plates(solution.problem.scene) and Stage.CONDENSATION not in built:
         yield "condensation: the parts came from the cache"
+
+
+def summary(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Sentences with their styles: the digits of K, what was skipped, and the answer with its bound."""
+    if record["digits"]:
+        yield f"{record['digits']}.", ""
+    for line in record["skipped"]:
+        yield f"Skipped: {line}.", "dim"
+    error, bound = record["judged_error_mm"], record["error_bound_mm"]
+    proven = np.isfinite(bound)
+    if error is None:
+        text = f"every displacement within {bound:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
+    else:
+        which = f"with a proven bound ({bound:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
+        away = f"{error:.1e} mm from the answer {which}"
+        text = f"{record['status']}, {away}: {record['verdict']} {LIMIT_MM:g} mm"
+    yield f"{record['method']}: {text}.", "green" if record["verdict"] == "within" else "red"
 
 
 def _is_given(scene: Scene) -> bool:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -16,19 +15,17 @@ from rich.console import Console
 from harness.results.atomic_output import atomic_output, refuse_unwritable, write_record
 from harness.terminal import DONE, FAILED
 from harness.terminal.console import ConsoleReporter, show_verdict
-from harness.verification.judge import LIMIT_MM
-from harness.verification.reference import UNPROVEN
 from problems.errors import InputError
 from problems.forms import Form
 from problems.scene_files import read_scene
 
 from . import allowed_gap, mesh_error
-from .answer_record import arrays_of, is_of_plates, recorded
-from .solution import solve as solved
+from .answer_record import arrays_of, is_of_plates, recorded, summary
+from .solution import solve
 from .validate import print_unusual
 
 
-def solve(
+def solve_into(
     source: str,
     solver: str | None,
     tolerance: float,
@@ -55,11 +52,12 @@ def solve(
         raise InputError.one("--refine", "scene", scene.name, allowed)
     print_unusual(scene, console)
     reporter = ConsoleReporter(console)
-    solution = solved(
+    solution = solve(
         scene, solver, form=form, tolerance=tolerance, limit_s=reference_limit_s, reporter=reporter
     )
     record, arrays = recorded(solution, reporter.stages, solver), arrays_of(solution)
-    _show(record, console)
+    for text, style in summary(record):
+        console.print(text, style=style)
     begun = time.perf_counter()
     with reporter.step("the same joint on another mesh"):
         mesh = mesh_error.estimated(solution, refine)
@@ -84,20 +82,3 @@ def solve(
         write_record(new, record)  # with the files that were added
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
     return code
-
-
-def _show(record: dict[str, Any], console: Console) -> None:
-    """Print what was skipped, and the answer with its bound."""
-    if record["digits"]:
-        console.print(f"{record['digits']}.")
-    for line in record["skipped"]:
-        console.print(f"Skipped: {line}.", style="dim")
-    error, bound = record["judged_error_mm"], record["error_bound_mm"]
-    proven = np.isfinite(bound)
-    if error is None:
-        text = f"every displacement within {bound:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
-    else:
-        which = f"with a proven bound ({bound:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
-        away = f"{error:.1e} mm from the answer {which}"
-        text = f"{record['status']}, {away}: {record['verdict']} {LIMIT_MM:g} mm"
-    console.print(f"{record['method']}: {text}.", style="green" if record["verdict"] == "within" else "red")

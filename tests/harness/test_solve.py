@@ -18,7 +18,7 @@ from small_problems import solve_by_nnls
 from suite_runs import said_by
 
 from harness.results.records import read_arrays
-from harness.scene.solve import solve
+from harness.scene.solve import solve_into
 from problems.build import load_case, model_of, prepared
 from problems.scene_files import read_scene
 from report.writers.answer_report import grid_with_fields, write_vtu
@@ -73,7 +73,7 @@ def run(folder: Path, text: str = SCENE, solver: str | None = None, preload: flo
     """Solve, and return what solution.json says with the exit code and the terminal's text."""
     path = folder / "scene.toml"
     path.write_text(text.replace("PRELOAD", str(preload)))
-    code, shown = said_by(partial(solve, str(path), solver, 1e-10, folder / "out"))
+    code, shown = said_by(partial(solve_into, str(path), solver, 1e-10, folder / "out"))
     record = json.loads((folder / "out" / "solution.json").read_text())
     return record | {"code": code, "shown": shown}
 
@@ -115,7 +115,7 @@ def test_a_named_solver_is_judged(tmp_path: Path) -> None:
 
 def test_an_answer_outside_the_limit_fails(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(SCENE.replace("PRELOAD", "80"))
-    code, shown = said_by(partial(solve, str(tmp_path / "scene.toml"), "piqp", 1e-1, tmp_path / "out"))
+    code, shown = said_by(partial(solve_into, str(tmp_path / "scene.toml"), "piqp", 1e-1, tmp_path / "out"))
     assert code == 1
     assert "outside" in shown
 
@@ -196,7 +196,7 @@ def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
     K = np.array([[3.0, 1.0, 0.0], [1.0, 4.0, 0.0], [0.0, 0.0, 2.0]])
     A = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
     np.savez(tmp_path / "mine.npz", K=K, A=A, f=np.array([5.0, 1.0, 0.0]), g=np.array([0.1, 9.0]))
-    assert said_by(partial(solve, str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "out"))[0] == 0
+    assert said_by(partial(solve_into, str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "out"))[0] == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         *("answer.md", "answer.pdf", "contacts.csv", "index.html", "nodes.csv"),
         *("solution.json", "solution.npz"),

@@ -11,7 +11,7 @@ from rich.console import Console
 from suite_runs import said_by
 
 from harness.measurement.suite_run import summary as summary_of_run
-from harness.scene.solve import solve
+from harness.scene.solve import solve_into
 from harness.series.run import summary
 from problems.build import prepared
 from problems.errors import InputError
@@ -26,7 +26,7 @@ def write(folder: Path, stiffness: np.ndarray, f: float) -> str:
 
 
 def said(folder: Path, f: float, stiffness: np.ndarray = K) -> tuple[int, str]:
-    return said_by(solve, write(folder, stiffness, f), None, 1e-9, folder / "out")
+    return said_by(solve_into, write(folder, stiffness, f), None, 1e-9, folder / "out")
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

@@ -12,7 +12,7 @@ from matrix_files import PATHS, files_of
 from rich.console import Console
 
 from harness.scene.export import export, import_
-from harness.scene.solve import solve
+from harness.scene.solve import solve_into
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
@@ -44,7 +44,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def answered(path: Path, out: Path, solver: str | None = None) -> dict[str, Any]:
-    assert solve(str(path), solver, 1e-9, out, QUIET) == 0
+    assert solve_into(str(path), solver, 1e-9, out, QUIET) == 0
     with np.load(out / "solution.npz") as arrays:
         return json.loads((out / "solution.json").read_text()) | dict(arrays)
 

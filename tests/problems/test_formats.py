@@ -18,7 +18,7 @@ from rich.console import Console
 from small_problems import make_load, make_prepared, solve_by_nnls
 
 from harness.scene.export import export, import_, matrices
-from harness.scene.solve import solve
+from harness.scene.solve import solve_into
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import expected_error
 from problems import formats
@@ -264,7 +264,7 @@ def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     formats.FORMATS["npz"].write(tmp_path / "seven.npz", data)
     shown, solved = StringIO(), StringIO()
     import_([str(tmp_path / "seven.npz")], tmp_path / "out.npz", Console(file=shown, width=200))
-    solve(str(tmp_path / "seven.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
+    solve_into(str(tmp_path / "seven.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
     for said in (shown.getvalue(), solved.getvalue(), (tmp_path / "answer" / "answer.md").read_text()):
         assert "seem to have 7 digits" in said
         assert "more than 1e-07 mm: export it with more digits" in said
@@ -285,7 +285,7 @@ def test_digits_of_many_separate_unknowns_take_no_reference_and_no_dense_matrix(
     formats.FORMATS["npz"].write(tmp_path / "mine.npz", data)
     monkeypatch.setattr(ComplianceProducts, "toarray", None)
     solved, shown = StringIO(), StringIO()
-    solve(str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
+    solve_into(str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
     monkeypatch.setattr(ReferenceProblem, "reference", None)
     import_([str(tmp_path / "mine.npz")], tmp_path / "out.npz", Console(file=shown, width=200))
     for said in (solved.getvalue(), shown.getvalue()):

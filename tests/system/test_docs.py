@@ -14,7 +14,7 @@ from typer.main import get_command
 
 from harness import api, check_solver, terminal
 from harness.cli.app import app
-from harness.scene.solve import solve
+from harness.scene.solve import solve_into
 from problems import effects
 from problems.build import load_case
 from problems.errors import InputError
@@ -40,7 +40,7 @@ def test_the_scene_of_the_page_is_solved_and_drawn_whole(
     """Its parts meet; the borders of the pictures are white, so that no title is cut."""
     monkeypatch.setattr("report.figures.style.DPI", 160)
     (tmp_path / "scene.toml").write_text(JOINT[1])
-    assert solve(str(tmp_path / "scene.toml"), None, 1e-9, tmp_path, Console(file=StringIO())) == 0
+    assert solve_into(str(tmp_path / "scene.toml"), None, 1e-9, tmp_path, Console(file=StringIO())) == 0
     for name in ("gap", "section", "forces", "displacement"):
         picture = imread(tmp_path / f"{name}.png")[:, :, :3]
         for border in (picture[:3], picture[-3:], picture[:, :3], picture[:, -3:]):
