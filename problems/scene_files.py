@@ -114,13 +114,13 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def _files_of(path: Path, table: dict[str, Any]) -> list[Path]:
     """The file of a scene, and the files that its table names."""
-    left, named = [*table.values()], [path]
-    while left:
-        match left.pop():
+    queue, named = [*table.values()], [path]
+    while queue:
+        match queue.pop():
             case dict() as table:
-                left += table.values()
+                queue += table.values()
             case list() as entries:
-                left += entries
+                queue += entries
             case str() as text if isfile(path.parent / text):
                 named.append(path.parent / text)
     return named
@@ -176,9 +176,11 @@ def _joint(
     if not table:
         return None
     parts = table.get("part")
-    own = isinstance(parts, list) and any(isinstance(part, dict) and "superelement" in part for part in parts)
+    of_superelements = isinstance(parts, list) and any(
+        isinstance(part, dict) and "superelement" in part for part in parts
+    )
     try:
-        joint: AnyJoint = _of_superelements(path, table) if own else Joint.model_validate(table)
+        joint: AnyJoint = _of_superelements(path, table) if of_superelements else Joint.model_validate(table)
     except InputError as error:
         faults += error.faults
         return None
@@ -190,7 +192,7 @@ def _joint(
         joint = joint.with_contacts((*joint.pairs, *dict.fromkeys(new)))
     wrong = [Fault(str(path), *fault) for fault in joint.faults()]
     faults += wrong
-    return None if own and wrong else joint  # without places nothing can be said of the effects
+    return None if of_superelements and wrong else joint  # without places nothing can be said of the effects
 
 
 def _of_superelements(path: Path, table: dict[str, Any]) -> AnyJoint:

@@ -131,19 +131,19 @@ def read_labelled(path: Path, choose: Choose = list) -> Read:
         raise InputError.one(path, "file", str(path), "no such file")
     format = format_of(path)
     try:
-        found = format.read(path, choose)
+        read = format.read(path, choose)
     except InputError:
         raise
     except Exception as error:  # of the libraries, which raise whatever a damaged file leads to
         raise InputError.one(path, "file", matrix_files.damage(error), "a readable matrix file") from error
-    for name, (M, labels) in found.items():
+    for name, (M, labels) in read.items():
         if sp.issparse(M):
             refuse_twice(path, name, M)
         if labels is not None and np.isfinite(M.data).all():
             node, dof = format.words
             rows = [f"{node} {at}, {dof} {k}" for at, k in labels.tolist()]
             refuse_no_stiffness(path, sp.csr_array(M), name, rows)
-    return found
+    return read
 
 
 def format_of(path: Path) -> Format:

@@ -47,18 +47,18 @@ def read_op4(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | No
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")  # such as a premature end
         names, matrices, forms, _ = reader.load(str(_plain(path, Path(folder))), into="list", sparse=None)
-    found: dict[str, Any] = {}
+    by_name: dict[str, Any] = {}
     for at, (written, M, form) in enumerate(zip(names, matrices, forms, strict=True)):
         name = OF_PROBLEM.get(written, written)
         if form == SYMMETRIC and one_sided(sp.csr_array(M)):
             M = mirrored(sp.csr_array(M))
-        if name in found and not _equal(M, found[name]):
+        if name in by_name and not _equal(M, by_name[name]):
             allowed = (
                 f"another {written} is before it, with other entries: each matrix needs a name to itself"
             )
             raise InputError.one(path, f"matrix {at + 1} of {len(names)}", written, allowed)
-        found.setdefault(name, M)
-    return {name: (found[name], None) for name in choose(list(found))}
+        by_name.setdefault(name, M)
+    return {name: (by_name[name], None) for name in choose(list(by_name))}
 
 
 def _equal(M: Any, other: Any) -> bool:

@@ -47,14 +47,14 @@ def regular_file(path: Path, key: str, mib: float) -> Path:
     Raises InputError.
     """
     try:
-        found = path.stat()
+        facts = path.stat()
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         why = getattr(error, "strerror", None) or str(error)
         raise InputError.one(path, key, why, "a readable file") from error
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(facts.st_mode):
         raise InputError.one(path, key, "no regular file", "a readable file")
-    if found.st_size > mib * MIB:
-        raise InputError.one(path, key, f"{found.st_size / MIB:.0f} MiB", f"a file of at most {mib:g} MiB")
+    if facts.st_size > mib * MIB:
+        raise InputError.one(path, key, f"{facts.st_size / MIB:.0f} MiB", f"a file of at most {mib:g} MiB")
     return path
 
 
@@ -81,11 +81,11 @@ def is_word(value: object) -> str:
     return WORD if isinstance(value, str) else VALUE
 
 
-def unknown(kind: str, value: object, known: Sequence[str]) -> str:
+def unknown(kind: str, value: object, names: Sequence[str]) -> str:
     """The message for an unknown name: similar names, and all that are allowed."""
-    similar = get_close_matches(str(value), known, 3)
+    similar = get_close_matches(str(value), names, 3)
     suggestion = f"did you mean {' or '.join(similar)}? " if similar else ""
-    return f"no such {kind}; {suggestion}allowed: {', '.join(known)}"
+    return f"no such {kind}; {suggestion}allowed: {', '.join(names)}"
 
 
 def _allowed(item: Any, model: type[BaseModel]) -> str:

@@ -56,7 +56,7 @@ def from_entries(
 
 
 def read_entries(
-    path: Path, body: bytes, before: int, fields: Sequence[str], kind: type = float
+    path: Path, body: bytes, lines_above: int, fields: Sequence[str], kind: type = float
 ) -> tuple[Any, Any, Place]:
     """The places (k, …) and values (k,) of lines of whole numbers and a last number, and the lines' names.
 
@@ -65,7 +65,7 @@ def read_entries(
     count = len(fields) - 1
 
     def line_of(k: int) -> tuple[str, str]:
-        numbered = enumerate(body.split(b"\n"), start=before + 1)
+        numbered = enumerate(body.split(b"\n"), start=lines_above + 1)
         lines = ((number, line) for number, line in numbered if line.strip(BLANK))
         number, line = next(islice(lines, k, None))
         return f"line {number}", line.decode("latin-1").strip()

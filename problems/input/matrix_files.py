@@ -44,14 +44,14 @@ def damage(error: Exception) -> str:
 
 def packed(arrays: Mapping[str, Any]) -> dict[str, Any]:
     """Arrays by name, of sparse matrices their parts."""
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for name, M in arrays.items():
         if sp.issparse(M):
             columns = sp.csc_array(M)
-            found |= {f"{name}_{part}": np.asarray(getattr(columns, part)) for part in PARTS}
+            flat |= {f"{name}_{part}": np.asarray(getattr(columns, part)) for part in PARTS}
         else:
-            found[name] = M
-    return found
+            flat[name] = M
+    return flat
 
 
 def unpacked(arrays: Mapping[str, Any], name: str) -> sp.csc_array:
@@ -77,21 +77,21 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
         files = set(archive.files)
         if {"format", "shape", "data"} <= files and not files & set(expected):
             M = {path.stem: sp.load_npz(path)}
-            found = {name: M[name] for name in choose(list(M))}
+            chosen = {name: M[name] for name in choose(list(M))}
         else:
             stems = [name.removesuffix("_indptr") for name in archive.files if name.endswith("_indptr")]
             stems = [name for name in stems if all(f"{name}_{part}" in files for part in PARTS)]
             parts = {f"{name}_{part}" for name in stems for part in PARTS}
             plain = [name for name in archive.files if name not in parts]
             names = stems + [name for name in plain if name in expected or _kind(archive, name) in NUMBERS]
-            found = {
+            chosen = {
                 name: unpacked(archive, name) if name in stems else archive[name] for name in choose(names)
             }
-    for name, M in found.items():
+    for name, M in chosen.items():
         if sp.issparse(M):
             _refuse_damaged(name, M)
             refuse_twice(path, name, M)
-    return found
+    return chosen
 
 
 def texts_of(path: Path) -> list[str]:

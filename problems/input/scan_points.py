@@ -55,17 +55,17 @@ def outliers(gaps: Vector, near: Indices | None = None) -> Mask:
     """(n,) which gaps are. near : `neighbours` of their points; without them `alone` is not tested."""
     middle = np.median(gaps)
     s = MAD * np.median(abs(gaps - middle))
-    found = abs(gaps - middle) > SPREADS * s + FAR
+    is_outlier = abs(gaps - middle) > SPREADS * s + FAR
     least, others = gaps.min(), gaps[gaps > gaps.min()]
     if least < 0 and len(others) and others.min() - least > 2 * s + BELOW:
-        found |= gaps == least
+        is_outlier |= gaps == least
     if near is not None and near.shape[1] == NEAR:
         beside = gaps[near]
         second = np.partition(abs(beside - gaps[:, None]), ALIKE - 1, axis=1)[:, ALIKE - 1]
         low, high = np.quantile(beside, [0.25, 0.75], axis=1)
         reach = np.maximum(QUARTILES * (high - low), max(SPREADS * np.median(second), ALONE))
-        found |= second > reach
-    return found
+        is_outlier |= second > reach
+    return is_outlier
 
 
 def unlike(points: Matrix) -> Iterator[tuple[int, str]]:
@@ -73,11 +73,11 @@ def unlike(points: Matrix) -> Iterator[tuple[int, str]]:
     if len(points) < 3:
         return
     near = neighbours(points[:, :2])
-    found = outliers(points[:, 2], near)
+    is_unlike = outliers(points[:, 2], near)
     apart = np.linalg.norm(points[near[:, 0], :2] - points[:, :2], axis=1)
     beside, far = points[near, 2], apart > QUARTILES * np.median(apart)
-    found |= (points == 0).all(axis=1) & (far | (beside.min(axis=1) > 0) | (beside.max(axis=1) < 0))
-    where = np.flatnonzero(found)
+    is_unlike |= (points == 0).all(axis=1) & (far | (beside.min(axis=1) > 0) | (beside.max(axis=1) < 0))
+    where = np.flatnonzero(is_unlike)
     for k in where[:SHOWN]:
         last = len(where) > SHOWN and k == where[SHOWN - 1]
         more = f"; {len(where) - SHOWN} more points are unusual" if last else ""

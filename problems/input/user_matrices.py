@@ -96,13 +96,13 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
     for key, path in files.items():
         try:
             one = key == "problem"
-            found = matrix_files.read(path, list, NAMES) if one else {key: matrix_files.read_mtx(path)}
+            read = matrix_files.read(path, list, NAMES) if one else {key: matrix_files.read_mtx(path)}
         except InputError:
             raise
         except Exception as error:  # zipfile and pickle raise their own kinds
             kind, where = (".npz with K, A, f, g", "file") if one else ("Matrix Market file", key)
             raise InputError.one(path, where, matrix_files.damage(error), f"a readable {kind}") from error
-        data |= found
+        data |= read
     data |= {key: data[key].toarray() for key in "fg" if sp.issparse(data.get(key))}
     return checked(data, {key: str(files.get("problem") or files.get(key)) for key in NAMES}, sparse)
 
@@ -198,9 +198,9 @@ def _wrong_strays(data: Mapping[str, Any], shape: tuple[int, int]) -> Faults:
             yield "K", key, f"array of shape {M.shape}", allowed
 
 
-def _fits(given: Any) -> bool:
+def _fits(numbers: Any) -> bool:
     """Whether float64 holds each of these finite numbers exactly."""
-    values = sp.coo_array(given).data if sp.issparse(given) else given
+    values = sp.coo_array(numbers).data if sp.issparse(numbers) else numbers
     if values.dtype == float or values.dtype.itemsize < 8:
         return True
     nearest = values.astype(float)

@@ -74,26 +74,26 @@ def condense(
             return S
         middle = (first + last) // 2
         south, north = stretch(first, middle), stretch(middle, last)
-        own, j = split[middle], counts[middle]
-        line = K[own][:, own].toarray() + north[: len(own), : len(own)]
-        stop = len(south) - len(own) + j  # of the unknowns up to the middle line's kept ones
+        line_dofs, j = split[middle], counts[middle]
+        line = K[line_dofs][:, line_dofs].toarray() + north[: len(line_dofs), : len(line_dofs)]
+        stop = len(south) - len(line_dofs) + j  # of the unknowns up to the middle line's kept ones
         begin = stop - j
 
-        S = np.empty((stop + len(north) - len(own),) * 2, order="F")  # nothing reads above the diagonal
+        S = np.empty((stop + len(north) - len(line_dofs),) * 2, order="F")  # nothing reads above the diagonal
         S[:stop, :stop] = south[:stop, :stop]
         S[begin:stop, begin:stop] += line[:j, :j]
         S[stop:, :begin] = 0.0
-        S[stop:, begin:stop] = north[len(own) :, :j]
-        S[stop:, stop:] = north[len(own) :, len(own) :]
+        S[stop:, begin:stop] = north[len(line_dofs) :, :j]
+        S[stop:, stop:] = north[len(line_dofs) :, len(line_dofs) :]
 
         # W = L⁻¹ K_i·; then K_·· −= WᵀW
         L, info = lapack.dpotrf(line[j:, j:] + south[stop:, stop:], lower=1, overwrite_a=1)
         if info:
-            raise NotPositiveDefinite(int(own[j + info - 1]))
-        rows = np.empty((len(own) - j, len(S)), order="F")
+            raise NotPositiveDefinite(int(line_dofs[j + info - 1]))
+        rows = np.empty((len(line_dofs) - j, len(S)), order="F")
         rows[:, :stop] = south[stop:, :stop]
         rows[:, begin:stop] += line[j:, :j]
-        rows[:, stop:] = north[len(own) :, j : len(own)].T
+        rows[:, stop:] = north[len(line_dofs) :, j : len(line_dofs)].T
         del south, north
         W = blas.dtrsm(1.0, L, rows, lower=1, overwrite_b=1)
         S = blas.dsyrk(-1.0, W, beta=1.0, c=S, trans=1, lower=1, overwrite_c=1)

@@ -53,8 +53,8 @@ def with_tool(a: Face) -> Pairing:
 
 def paired(a: Face, b: Face, distance: float) -> Pairing:
     """distance : up to which |t| two surfaces may touch, mm."""
-    t, foot, found, away = _feet(a, b)
-    on = found & b.surface.covers(foot)
+    t, foot, has_foot, away = _feet(a, b)
+    on = has_foot & b.surface.covers(foot)
     near = on & (abs(t) <= distance)
     nodes = np.flatnonzero(near)
     far = {int(k): float(t[k]) for k in np.flatnonzero(on & ~near)}
@@ -63,7 +63,7 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
     u, v = (foot[corners[:, k]] - foot[corners[:, 0]] for k in (1, 2))
     turned = corners[cross(u, v) <= 0]
     crossed = tuple(tuple(each) for each in turned.tolist())
-    lost = np.flatnonzero(~found & (away <= distance))
+    lost = np.flatnonzero(~has_foot & (away <= distance))
     W = b.surface.weights(foot[nodes])
     return Pairing(nodes, W, t[nodes], int((~on).sum()), far, crossed, tuple(lost.tolist()))
 
@@ -88,8 +88,8 @@ def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask, Vector]:
         point[off], m[off] = b.xyz[nearest], b.normals[nearest]
         with np.errstate(divide="ignore", invalid="ignore"):
             step = ((point - q) * m).sum(axis=1) / (n * m).sum(axis=1)
-        found = abs(step) <= SETTLED
+        settled = abs(step) <= SETTLED
         t = t + np.nan_to_num(step, nan=0.0, posinf=0.0, neginf=0.0)
-        if found.all():
+        if settled.all():
             break
-    return t, (p + t[:, None] * n)[:, :2], found, away
+    return t, (p + t[:, None] * n)[:, :2], settled, away

@@ -261,13 +261,13 @@ def wrong_contacts(
     at_one_place : whether all pairs meet at the same nodes, so that one of a closed chain follows from the
     others, and Q = AᵀK⁻¹A is singular.
     """
-    known = list(names)
-    if len(set(known)) < len(known) or TOOL in known:
-        yield "part.name", known, f'each part needs a unique name other than "{TOOL}"'
+    parts = list(names)
+    if len(set(parts)) < len(parts) or TOOL in parts:
+        yield "part.name", parts, f'each part needs a unique name other than "{TOOL}"'
     for pair in contacts:
-        if pair[0] not in known or pair[1] not in (*known, TOOL) or pair[0] == pair[1]:
-            yield "contacts", list(pair), f'two different parts of {known}; the second may be "{TOOL}"'
-    sides = np.array([[(name == a) - (name == b) for name in known] for a, b in pairs])
+        if pair[0] not in parts or pair[1] not in (*parts, TOOL) or pair[0] == pair[1]:
+            yield "contacts", list(pair), f'two different parts of {parts}; the second may be "{TOOL}"'
+    sides = np.array([[(name == a) - (name == b) for name in parts] for a, b in pairs])
     if len(np.unique(abs(sides), axis=0)) < len(pairs):
         yield "contacts", [list(pair) for pair in pairs], "no pair twice"
     elif at_one_place and pairs and np.linalg.matrix_rank(sides) < len(pairs):

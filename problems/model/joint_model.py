@@ -75,12 +75,12 @@ class JointModel:
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
-        joint, given = self.joint, self.scene.effects if effects is None else tuple(effects)
-        f, g = junction_load(given, joint)
+        joint, acting = self.joint, self.scene.effects if effects is None else tuple(effects)
+        f, g = junction_load(acting, joint)
         if sparse:
             at_junction, f = f, np.zeros(self.numbering.size)
             f[self.junction] = at_junction
-        for load in (effect for effect in given if isinstance(effect, PartLoadEffect)):
+        for load in (effect for effect in acting if isinstance(effect, PartLoadEffect)):
             k = joint.names.index(load.part)
             if sparse:
                 place, force = self.numbering.places[k], load.load(self.parts[k])
@@ -154,11 +154,11 @@ class JointModel:
     def _at_junction(self, M: sp.sparray) -> sp.csc_array:
         """(N, k): the rows of M (n, k) at the junction's deflections, the others zero."""
         M = sp.csc_array(M)
-        found = sp.csc_array(
+        K_block = sp.csc_array(
             (M.data.copy(), self.junction[M.indices], M.indptr), shape=(self.numbering.size, M.shape[1])
         )
-        found.sort_indices()
-        return found
+        K_block.sort_indices()
+        return K_block
 
     def _nodes(self) -> np.ndarray:
         """(N, 2) the coordinates of each unknown's node, mm."""
@@ -196,10 +196,10 @@ class JointModel:
                 raise indefinite(source_of("K"), f"part.{part.name}", str(error)) from error
             blocks.append(K)
         groups, key = [[k] for k in range(len(blocks))], storage.digest(keys)
-        before = {"condensation": sum(seconds.values())}
+        spent = {"condensation": sum(seconds.values())}
         if self.springs:
             groups, key = self.springs.ranges, self.springs.key(key)
-            blocks, before["ties"] = self.springs.blocks(key, blocks, reporter)
+            blocks, spent["ties"] = self.springs.blocks(key, blocks, reporter)
         nodes = np.tile(joint.nodes, (len(joint.part), 1))
         assembly = Assembly(Stiffness.of(*blocks), joint.contact_matrix(), nodes, self._names(groups))
-        return DensePrepared(assembly, key, before, source_of, reporter)
+        return DensePrepared(assembly, key, spent, source_of, reporter)

@@ -157,15 +157,15 @@ def line_matrices(grid: Vector, start: float = -np.inf, stop: float = np.inf) ->
     points, weights = np.polynomial.legendre.leggauss(4)
     elements = np.arange(len(grid) - 1)
     h = np.diff(grid)
-    left = np.clip(grid[:-1], start, stop)
-    length = np.clip(grid[1:], start, stop) - left
+    first = np.clip(grid[:-1], start, stop)
+    length = np.clip(grid[1:], start, stop) - first
 
     dofs = 2 * elements[:, None] + np.arange(4)
     rows = np.repeat(dofs, 4, axis=1).ravel()
     columns = np.tile(dofs, 4).ravel()
     entries = np.zeros((4, len(elements), 4, 4))
     for point, weight in zip(points, weights, strict=True):
-        t = (left + length * (1 + point) / 2 - grid[:-1]) / h
+        t = (first + length * (1 + point) / 2 - grid[:-1]) / h
         phi, slope, curvature = (shape(t, h, d).T for d in range(3))
         w = (weight * length / 2)[:, None, None]
         for k, (u, v) in enumerate([(phi, phi), (slope, slope), (curvature, curvature), (curvature, phi)]):

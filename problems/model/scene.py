@@ -108,11 +108,11 @@ class JointScene(Scene):
     @cached_property
     def unusual(self) -> list[str]:
         """A sentence on each parameter that may be, but is rarely meant."""
-        found = [("joint", self.joint.unusual())]
-        found += [(effect.kind, effect.unusual(self.joint)) for effect in self.effects]
+        told = [("joint", self.joint.unusual())]
+        told += [(effect.kind, effect.unusual(self.joint)) for effect in self.effects]
         return [
             f"{where}.{key} = {shown} is unusual; usual is {usual}"
-            for where, some in found
+            for where, some in told
             for key, value, usual in some
             for shown in [value if isinstance(value, list | str) else f"{value:g}"]
         ]

@@ -125,11 +125,11 @@ class SuperelementJoint:
     @cached_property
     def faces(self) -> dict[str, Face]:
         """In the axes of the plane. Raises ValueError if the nodes of a part are on one line."""
-        found = {}
+        faces = {}
         for part in self.parts:
             xyz, normals = (each[part.contacts] @ self.axes.T for each in (part.nodes.xyz, part.nodes.normal))
-            found[part.name] = Face(xyz, normals, surface_of(xyz[:, :2]))
-        return found
+            faces[part.name] = Face(xyz, normals, surface_of(xyz[:, :2]))
+        return faces
 
     @cached_property
     def pairings(self) -> dict[Pair, Pairing]:
@@ -161,17 +161,17 @@ class SuperelementJoint:
         yield from wrong or itertools.chain.from_iterable(map(self._wrong_pairing, self.pairs))
 
     def _wrong_pairing(self, pair: Pair) -> Faults:
-        found, a, name = self.pairings[pair], self._of[pair[0]], " – ".join(pair)
-        if not len(found.nodes):
-            nothing = f"no node of {pair[0]} has a foot on {pair[1]}: {found.beyond} are beyond its surface"
-            near = f", {len(found.far)} too far: {self._distances(pair)}" if found.far else ""
+        pairing, a, name = self.pairings[pair], self._of[pair[0]], " – ".join(pair)
+        if not len(pairing.nodes):
+            nothing = f"no node of {pair[0]} has a foot on {pair[1]}: {pairing.beyond} are beyond its surface"
+            near = f", {len(pairing.far)} too far: {self._distances(pair)}" if pairing.far else ""
             yield f"contacts, {name}", nothing + near, f"pairing.distance = {self.distance:g} mm or more"
-        if found.lost:
-            lost = listed(map(str, a.nodes.ids[a.contacts[list(found.lost)]]))
+        if pairing.lost:
+            lost = listed(map(str, a.nodes.ids[a.contacts[list(pairing.lost)]]))
             allowed = f"normals along which a line meets {pair[1]}"
             yield f"contacts, {name}", f"no foot found of ids {lost}", allowed
-        if found.crossed:
-            ids = [a.nodes.ids[a.contacts[list(each)]] for each in found.crossed]
+        if pairing.crossed:
+            ids = [a.nodes.ids[a.contacts[list(each)]] for each in pairing.crossed]
             value = listed(" and ".join(map(str, each)) for each in ids)
             yield (
                 f"contacts, {name}",
@@ -196,12 +196,12 @@ class SuperelementJoint:
                     f"none: is this their place? Ids {listed(map(str, part.nodes.ids[part.contacts[far]]))}"
                 )
                 yield f"part.{part.name}, nodes far from all others", len(far), usual
-        for pair, found in self.pairings.items():
+        for pair, pairing in self.pairings.items():
             name = " – ".join(pair)
-            if found.far:
+            if pairing.far:
                 usual = f"none: they are no contacts: {self._distances(pair)}"
-                yield f"{name}, nodes farther apart than {self.distance:g} mm", len(found.far), usual
-            if len(found.apart) and (apart := float(np.median(found.apart))) < -self.distance / 100:
+                yield f"{name}, nodes farther apart than {self.distance:g} mm", len(pairing.far), usual
+            if len(pairing.apart) and (apart := float(np.median(pairing.apart))) < -self.distance / 100:
                 usual = f"0 or more, with {pair[1]} on the side of {pair[0]} to which its normals point"
                 yield f"{name}, median distance along the normal", apart, usual
 
@@ -311,13 +311,13 @@ class SuperelementJoint:
 
     def contact_matrix(self) -> sp.csc_array:
         columns = []
-        for pair, found in self.pairings.items():
-            normals = self._normals[pair[0]][found.nodes]
-            own = sp.eye_array(len(self.faces[pair[0]].xyz), format="csr")[found.nodes]
+        for pair, pairing in self.pairings.items():
+            normals = self._normals[pair[0]][pairing.nodes]
+            own = sp.eye_array(len(self.faces[pair[0]].xyz), format="csr")[pairing.nodes]
             rows = {pair[0]: self._along(pair[0], own, normals)}
             if pair[1] != TOOL:
-                rows[pair[1]] = -self._along(pair[1], found.W, normals)
-            columns.append(across(self, rows, len(found.nodes)))
+                rows[pair[1]] = -self._along(pair[1], pairing.W, normals)
+            columns.append(across(self, rows, len(pairing.nodes)))
         if not columns:
             return sp.csc_array((self.size[0], 0))
         A = sp.csc_array(sp.vstack(columns).T)

@@ -75,11 +75,11 @@ class SuperelementModel:
             if part.size > SMALL and not part.sparse:
                 allowed = f"at most {DENSEST:.0%} of its entries nonzero: use --form dual or primal"
                 raise InputError.one(part.file, "K", "dense", allowed)
-        given = [sp.csc_array(part.stiffness) for part in self.joint.parts]
+        matrices = [sp.csc_array(part.stiffness) for part in self.joint.parts]
         added, blocks = self.springs.added, []
         for group in self.springs.ranges:
             rows = self.springs.rows(group)
-            K = sp.block_diag([given[part] for part in group], format="csc")
+            K = sp.block_diag([matrices[part] for part in group], format="csc")
             blocks.append(sp.csc_array(K + added[rows, rows] if self.springs else K))
         seconds = time.perf_counter() - start
         key = storage.digest("sparse", self._key, fingerprint([Path(__file__)], ("problems/model",)))

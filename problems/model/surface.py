@@ -140,11 +140,11 @@ class Triangles(Surface):
 
     @property
     def triangles(self) -> Indices:  # type: ignore[override]
-        found = self.mesh.simplices[self.kept].astype(np.intp)
-        a, b, c = (self.nodes[found[:, j]] for j in range(3))
+        corners = self.mesh.simplices[self.kept].astype(np.intp)
+        a, b, c = (self.nodes[corners[:, j]] for j in range(3))
         turned = cross(b - a, c - a) < 0
-        found[turned] = found[turned, ::-1]
-        return self.order[found]
+        corners[turned] = corners[turned, ::-1]
+        return self.order[corners]
 
     def weights(self, points: Matrix) -> sp.csr_array:
         points = points - self.middle
@@ -154,11 +154,11 @@ class Triangles(Surface):
         cell = np.where(owner >= 0, self.cell[owner], -1)
         count = np.where(cell >= 0, np.diff(self.start)[cell], 0)
         for n in np.unique(count[count > 0]):
-            own = np.flatnonzero(count == n)
-            corners = self.corner[self.start[cell[own], None] + np.arange(n)]
-            rows.append(np.repeat(own, n))
+            group = np.flatnonzero(count == n)
+            corners = self.corner[self.start[cell[group], None] + np.arange(n)]
+            rows.append(np.repeat(group, n))
             columns.append(corners.ravel())
-            values.append(wachspress(self.nodes[corners], points[own]).ravel())
+            values.append(wachspress(self.nodes[corners], points[group]).ravel())
         places = np.concatenate(rows), self.order[np.concatenate(columns)]
         W = sp.csr_array(sp.coo_array((np.concatenate(values), places), shape=(len(points), len(self.nodes))))
         W.eliminate_zeros()

@@ -44,13 +44,15 @@ def cells_of(nodes: Matrix, triangles: Indices, beside: Indices) -> tuple[Indice
     blunt = angle >= np.pi / 2 - ROUNDING
     fat = angle.min(axis=1) > SLIVER
     alike = inside & fat[:, None] & fat[beside] & (abs(angle + across - np.pi) <= ROUNDING)
-    cell, pocket = (_joined(here[each], beside[each], len(here)) for each in (alike, alike | inside & blunt))
+    cell, pocket = (
+        _joined(here[links], beside[links], len(here)) for links in (alike, alike | inside & blunt)
+    )
 
     near = solid[:, None] & (~inside | ~blunt & (across < np.pi / 2 - ROUNDING))
     usual = _medians(np.concatenate([first[near], second[near]]), np.tile(edge[near], 2), len(nodes))
     circle = np.divide(edge.prod(axis=1), double, out=np.zeros(len(double)), where=solid)
     border = np.where(inside & (pocket[beside] == pocket[:, None]), 0.0, edge)
-    apart, around = (_largest(pocket, each.max(axis=1)) for each in (usual[triangles], border))
+    apart, around = (_largest(pocket, links.max(axis=1)) for links in (usual[triangles], border))
     opens = _largest(pocket, (blunt & ~inside).max(axis=1)) > 0
     width = np.where(opens[pocket], _largest(cell, edge.max(axis=1))[cell], _largest(pocket, circle)[pocket])
     limit = np.minimum(BRIDGE * apart, np.where(opens, np.inf, HOLE * around))
@@ -96,11 +98,11 @@ def wachspress(corners: Matrix, points: Matrix) -> Matrix:
     w_i is the area of the corner i and its neighbours, times those that the point spans with all edges but
     the two that meet there.
     """
-    before, after = np.roll(corners, 1, axis=1), np.roll(corners, -1, axis=1)
+    previous, after = np.roll(corners, 1, axis=1), np.roll(corners, -1, axis=1)
     at = points[:, None]
     spanned = np.clip(cross(corners - at, after - at), 0.0, None)
     spanned /= spanned.max(axis=1, keepdims=True)
-    shares = cross(corners - before, after - corners)
+    shares = cross(corners - previous, after - corners)
     n = corners.shape[1]
     for i in range(n):
         shares[:, i] *= np.delete(spanned, [i - 1, i], axis=1).prod(axis=1)
