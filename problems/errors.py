@@ -7,13 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 CONTROL = re.compile("[\0-\x1f\x7f]")
-#: What "parts\\top.npz" of a TOML file has become: a tab and op.npz.
+#: A hint for "parts\\top.npz" in a TOML file, which is a tab and op.npz.
 BACKSLASH = "; a backslash in TOML's double quotes begins an escape: write /, or single quotes"
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One error in an input. where : file or argument. key : the entry in it. allowed : valid values."""
+    """One error in an input.
+
+    where : the file or argument. key : the entry in it. value : what it has. allowed : the valid values.
+    """
 
     where: str
     key: str
@@ -30,7 +33,7 @@ class Fault:
 
 
 class InputError(ValueError):
-    """All errors in an input, together."""
+    """All errors in an input, in one exception; `faults` lists them."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.faults = list(faults)

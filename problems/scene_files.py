@@ -1,4 +1,4 @@
-"""Reads scenes, a joint with the effects to include, from TOML files; reports all errors at once.
+"""Reads scenes from TOML files, a joint and its effects, and reports all errors at once.
 
     title = "…"
     assembly = "wing-fragment-4386"       # a file in problems/assemblies, or a path; or [joint] here
@@ -6,8 +6,8 @@
     kind = "initial_gap"                  # a file in problems/effects
     mean = 0.6
 
-whose parts are plates, or superelements with `superelement` and `nodes` (docs/own-parts.md); or, for matrices
-of a whole problem, `[matrices]` with K, A, f, g (Matrix Market) or problem (.npz).
+The parts of a joint are plates, or superelements with `superelement` and `nodes` (docs/own-parts.md). Instead
+of a joint, `[matrices]` names the matrices of a whole problem: K, A, f, g (Matrix Market) or problem (.npz).
 """
 
 import re
@@ -85,7 +85,7 @@ def scene_of(table: Mapping[str, Any], name: str = "scene") -> Scene:
 
 
 def _as_toml(value: Any) -> Any:
-    """What tomllib would have made of it: dicts, lists and scalars."""
+    """The value as tomllib would return it: dicts, lists and scalars."""
     if isinstance(value, Table):
         return value.model_dump(exclude_unset=True)
     if isinstance(value, Mapping):
@@ -102,7 +102,7 @@ def _unknown_scene(name: str, known: list[str]) -> InputError:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file as a dict; InputError if it cannot be read."""
+    """Read a TOML file. Raises InputError."""
     try:
         return tomllib.loads(read_text(path, "file", TOML_MIB, strict=True))
     except InputError:
@@ -151,7 +151,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:
-    """The table of the joint and its file; empty if there is none."""
+    """The file and the table of the joint; the table is empty if there is none."""
     table = data.pop("joint", None)
     if "assembly" in data:
         if table is not None:
@@ -172,7 +172,7 @@ def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple
 def _joint(
     path: Path, table: dict[str, Any], effects: tuple[Effect, ...], faults: list[Fault]
 ) -> AnyJoint | None:
-    """The joint with the contacts that effects add; None if its table is wrong."""
+    """The joint with the contacts that effects add; None if its table is wrong, which `faults` then says."""
     if not table:
         return None
     parts = table.get("part")

@@ -20,8 +20,8 @@ DISC = _INSIDE / (2 * _INSIDE.std())
 class Clamps(Positions):
     """f += force on the first part of every contact, −= on the second, spread evenly under the pad.
 
-    clamping_force in N per clamp, on what both parts have of a disc of `radius` mm around its place:
-    on points that share it evenly, each by the weights of the nodes around it.
+    clamping_force in N per clamp, on the part of a disc of `radius` mm that both parts cover. Points of that
+    disc share the force evenly, and each acts on the nodes around it by the weights of its place.
     """
 
     in_holes: ClassVar[bool] = False

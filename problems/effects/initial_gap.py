@@ -13,7 +13,7 @@ from problems.model.interface import AnyJoint, Pair
 from problems.model.joint import Faults, Table
 from problems.model.junction_terms import at_contacts
 
-#: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `square_root`.
+#: How far L² may be from a correlation matrix, as a share of its largest eigenvalue; see `square_root`.
 SHIFT = 1e-10
 
 
@@ -55,7 +55,7 @@ class InitialGap(ContactEffect, GapEffect):
         )
 
     def on_grid(self, joint: AnyJoint) -> dict[Pair, Matrix]:
-        """mean + sd · Ly Z Lx, mm, of each pair, on the grid of the joint; none without a random field."""
+        """The random gap, mean + sd · Ly Z Lx, mm, of each pair on the joint's grid; {} if none is random."""
         if self.random is None:
             return {}
         rng = np.random.default_rng(self.random.seed)
@@ -71,9 +71,9 @@ class InitialGap(ContactEffect, GapEffect):
 def square_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     """Symmetric square root of C = exp(−(x_i − x_j)² / 2ℓ²): unique, so that no sign depends on the machine.
 
-    √w of an eigenvalue w within rounding of 0 would differ by some 1e-8 from one processor, or number of
-    threads, to the next, and the gaps as much. w / √(w + s) differs by rounding / √s; its square is w to
-    within s = SHIFT · max w.
+    The square root √w of an eigenvalue w ≈ 0 would amplify its rounding: gaps would differ by some 1e-8
+    between processors or numbers of threads. w / √(w + s) differs by rounding / √s only, and its square is w
+    to within s = SHIFT · max w.
     """
     grid = np.frombuffer(grid_bytes)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / correlation_length) ** 2)

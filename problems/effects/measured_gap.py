@@ -60,7 +60,7 @@ class MeasuredGap(ContactEffect, GapEffect):
         return at_contacts(lambda pair: self._at(joint.places(pair))[0], self.pairs(joint), joint)
 
     def _at(self, nodes: Matrix) -> tuple[Vector, Vector]:
-        """Gaps, and the distances of `beyond`."""
+        """The gaps at nodes (c, 2), and the distance of each from the nearest point if it is beyond these."""
         surface, gaps = _surface(self.points)
         distance, nearest = surface.tree.query(nodes - surface.middle)
         W = surface.weights(nodes)

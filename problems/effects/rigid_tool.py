@@ -14,7 +14,7 @@ from problems.model.junction_terms import at_contacts
 
 
 class RigidTool(PartEffect, GapEffect):
-    """Adds the contact of `part` and the tool at every junction node, x ≤ g, with
+    """A contact x ≤ g of `part` and the tool at every junction node, with
 
         g += distance + ½ κ_x (x − x_0)² + ½ κ_y (y − y_0)².
 

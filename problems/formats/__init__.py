@@ -1,6 +1,6 @@
-"""File formats of K, A, f, g, by name; libraries are imported when a file is read or written.
+"""The file formats of K, A, f, g, by name; libraries are imported when a file is read or written.
 
-Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known.
+`Data` is a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if they are known.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,7 +50,7 @@ class Format:
 
 
 def _write_npz(path: Path, data: Data) -> None:
-    """The format that scenes open; K and A of a sparse problem as compressed columns."""
+    """Write the .npz that scenes open; K and A of a sparse problem as compressed columns."""
     n = data["K"].shape[0]
     if n <= SMALL or data["K"].nnz > DENSEST * n**2:
         data = data | {name: data[name].toarray() for name in "KA"}
@@ -94,15 +94,15 @@ FORMATS = {
 
 
 def read(path: Path) -> Data:
-    """The matrices of a file, by their names in it; a file that holds one matrix names it by its stem.
+    """Read the matrices of a file by their names in it; a nameless one has the file's stem as its name.
 
-    Raises InputError if it is not readable.
+    Raises InputError.
     """
     return {name: vector(M) if name in ("f", "g") else M for name, (M, _) in read_labelled(path).items()}
 
 
 def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tuple[Any, Labels, list[str]]:
-    """One matrix of a file: the one called `matrix`, or else `name`, or the only one.
+    """Read one matrix of a file: the one called `matrix`, or else `name`, or the only one.
 
     Returns the matrix, the node and degree of freedom of each row (n, 2) if the file has labels, and the
     names of the other arrays in the file. Raises InputError.
@@ -126,7 +126,7 @@ def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tu
 
 
 def read_labelled(path: Path, choose: Choose = list) -> Read:
-    """The chosen matrices of a file by their names in it, and the labels of their rows. Raises InputError."""
+    """Read the chosen matrices of a file by their names, with the labels of their rows. Raises InputError."""
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
     format = format_of(path)
@@ -147,7 +147,7 @@ def read_labelled(path: Path, choose: Choose = list) -> Read:
 
 
 def format_of(path: Path) -> Format:
-    """The format of a file, from its suffix and, if that is ambiguous, its content."""
+    """The format of a file by its suffix and, if that is ambiguous, its content. Raises InputError."""
     suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     for each in FORMATS.values():
         if suffix in each.suffixes and each.accepts(path):

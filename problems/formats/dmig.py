@@ -37,7 +37,7 @@ Point = tuple[int, int]
 
 @dataclass
 class Cards:
-    """A matrix: its form, the line of its header, and of each entry row, column, value and line."""
+    """The cards of a matrix: form, line of the header, and the row, column, value and line of each entry."""
 
     form: int
     line: int
@@ -45,7 +45,7 @@ class Cards:
 
     @property
     def points(self) -> list[Point]:
-        """Of the rows and columns of a square matrix, which has no others."""
+        """The points of the rows and columns of a square matrix."""
         return sorted({point for row, column, *_ in self.entries for point in (row, column)})
 
 
@@ -67,13 +67,13 @@ def write_dmig(path: Path, data: dict[str, Any]) -> None:
 
 
 def _field(value: float) -> str:
-    """Ten digits in 16 characters, of an exponent of three digits without its letter."""
+    """A number with ten digits in 16 characters; an exponent of three digits has no letter."""
     text = f"{value:16.9E}"
     return text.replace("E", "D") if len(text) == 16 else text.replace("E", "")
 
 
 def read_dmig(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | None]]:
-    """The chosen matrices, and point and component of the rows of a square one. Raises InputError."""
+    """Read the chosen matrices, with the points and components of a square one. Raises InputError."""
     cards = _cards(path)
     names = {OF_PROBLEM.get(name, name): name for name in cards}
     return {name: _read(path, names[name], cards) for name in choose(list(names))}
@@ -108,7 +108,7 @@ def _first(count: int) -> list[Point]:
 def _over(
     path: Path, name: str, cards: Cards, rows: Sequence[Point], columns: Sequence[Point], what: str
 ) -> sp.csr_array:
-    """The entries in these rows and columns. Raises InputError for one that is elsewhere, or twice."""
+    """The matrix over these rows and columns. Raises InputError for an entry elsewhere, or listed twice."""
 
     def place(k: int) -> str:
         (a, b), (c, d), _, line = cards.entries[k]

@@ -1,4 +1,4 @@
-"""Matrices as text: Matrix Market, and Abaqus' as *MATRIX OUTPUT writes it.
+"""Matrices as text: Matrix Market, and Abaqus' text of *MATRIX OUTPUT.
 
 Matrix Market is a folder with K.mtx, A.mtx, f.mtx, g.mtx; 17 digits keep every bit. Abaqus has no text format
 for A, f, g, which stay Matrix Market files; its stiffness are lines of numbers, one triangle of K or both:
@@ -47,7 +47,7 @@ def write_one(path: Path, matrix: object, symmetry: str) -> None:
 
 
 def stem(path: Path) -> str:
-    """The name of a file without its suffix, and without that of its compression."""
+    """The name of a file without its suffixes, as K of K.mtx.gz."""
     return Path(path.name.removesuffix(".gz")).stem
 
 
@@ -67,7 +67,7 @@ def write_abaqus(path: Path, data: dict[str, Any]) -> None:
 
 
 def read_abaqus(path: Path, choose: Choose) -> dict[str, tuple[sp.csr_array, np.ndarray | None]]:
-    """K, and (n, 2) the node and dof of each row where the file says them. Raises InputError."""
+    """Read K, with the node and dof of each row (n, 2) if the file has labels. Raises InputError."""
     return {name: _read(path) for name in choose([stem(path)])}
 
 

@@ -41,7 +41,7 @@ def write_op4(path: Path, data: dict[str, Any]) -> None:
 
 
 def read_op4(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | None]]:
-    """The chosen matrices by their names, which have no small letters. Raises InputError if two differ."""
+    """Read the chosen matrices by name, in capitals. Raises InputError if two of a name differ."""
     reader = pyyeti(path).op4.OP4()
     reader._check_name = lambda name: name.strip(" \0").upper()  # pyyeti's renames what is no word of Python
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
@@ -66,7 +66,7 @@ def _equal(M: Any, other: Any) -> bool:
 
 
 def _plain(path: Path, folder: Path) -> Path:
-    """The file, or if it is text, a copy in the folder as pyyeti reads it: with E before each exponent."""
+    """A path that pyyeti reads: the binary file itself, or a copy of a text with E before each exponent."""
     with path.open("rb") as file:
         start = file.read(4)
     if start.count(0) > 2 and not start.startswith((GZIP, *WIDE)):  # two: UTF-16 without a mark

@@ -1,5 +1,6 @@
-"""Numbers, names and files from outside, bounded by type: what no structure has is refused at the door, in
-faults that name the unit and what is allowed.
+"""Types of numbers, names and files that users give, with bounds that every real structure keeps.
+
+Whatever is out of bounds is refused in faults that name the unit and the allowed values.
 """
 
 import os
@@ -14,7 +15,7 @@ from pydantic import BaseModel, Field, StringConstraints, ValidationError
 
 from problems.errors import Fault, InputError
 
-LARGEST = 1e15  # in mm, N and whatever is made of them
+LARGEST = 1e15  # in mm, N and units made of them
 MIB = 2**20
 
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
@@ -26,15 +27,12 @@ Seed = Annotated[int, Field(ge=0, lt=2**53)]
 ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
 Name = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=ONE_LINE)]
 
-#: Tags of what may be a value or a word, such as "auto"; left out of the keys in messages.
+#: Tags of a parameter that may be a value or a word, such as "auto"; left out of the keys in messages.
 VALUE, WORD = "a value", "a word"
 
 
 def resolved(path: Path) -> Path:
-    """The absolute path without symbolic links; whoever opens it finds out if these have no end.
-
-    Raises InputError.
-    """
+    """The absolute path without symbolic links, of a file that need not exist. Raises InputError."""
     try:
         return Path(os.path.realpath(path))
     except ValueError as error:
@@ -42,9 +40,9 @@ def resolved(path: Path) -> Path:
 
 
 def regular_file(path: Path, key: str, mib: float) -> Path:
-    """The path, if it is a file of at most so many MiB; a pipe or a device would never end.
+    """The path, if it is a regular file of at most `mib` MiB; a pipe or a device might never end.
 
-    Raises InputError.
+    Raises InputError, with `key` in its message.
     """
     try:
         facts = path.stat()
@@ -61,7 +59,7 @@ def regular_file(path: Path, key: str, mib: float) -> Path:
 def validation_faults(
     where: object, model: type[BaseModel], error: ValidationError, prefix: str = ""
 ) -> Iterator[Fault]:
-    """The faults of a table that is not a valid `model`, each with the unit its key is annotated with."""
+    """Yield the faults of a table that is not a valid `model`, each with the unit of its key."""
     items = error.errors()
     for item in items:
         depth = len(item["loc"])
@@ -77,7 +75,7 @@ def validation_faults(
 
 
 def is_word(value: object) -> str:
-    """The tag of a value."""
+    """The tag of a value: WORD for a string, else VALUE."""
     return WORD if isinstance(value, str) else VALUE
 
 
@@ -113,7 +111,7 @@ def _table(model: type[BaseModel], path: Sequence[object]) -> type[BaseModel]:
 
 
 def _unit(model: type[BaseModel], path: Sequence[object]) -> str | None:
-    """The unit of what is at a path inside a model: the innermost that is given."""
+    """The unit of the key at a path inside a model, or of the innermost table around it that has one."""
     for k in reversed(range(len(path))):
         if field := _table(model, path[:k]).model_fields.get(str(path[k])):
             return next((unit for unit in field.metadata if isinstance(unit, str)), None)

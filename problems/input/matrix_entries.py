@@ -33,10 +33,10 @@ def from_entries(
     place: Place,
     sign: int | None = None,
 ) -> sp.csr_array:
-    """The matrix of entries (values, rows, columns), those of value 0 kept.
+    """The sparse matrix with these entries (values, rows, columns); entries of value 0 are kept.
 
-    place : of entry k in the file. sign : ±1 if (i, j) stands for (j, i) too, with that sign; None if not.
-    Raises InputError naming two entries at one place, or two that contradict each other.
+    place : names entry k in messages, as its line. sign : ±1 if (i, j) stands for (j, i) too, with that sign;
+    None if not. Raises InputError naming two entries at one place, or two that contradict each other.
     """
     values, i, j = entries
     M = sp.csr_array(sp.coo_array((values, (i, j)), shape=shape))
@@ -58,9 +58,10 @@ def from_entries(
 def read_entries(
     path: Path, body: bytes, lines_above: int, fields: Sequence[str], kind: type = float
 ) -> tuple[Any, Any, Place]:
-    """The places (k, …) and values (k,) of lines of whole numbers and a last number, and the lines' names.
+    """The entries in lines of whole numbers and a last number, one entry per line.
 
-    body : the file after so many lines. Raises InputError naming the first line that is neither so nor empty.
+    body : the rest of the file, after `lines_above` lines. Returns the whole numbers (k, …), the values (k,),
+    and a function that names the line of an entry. Raises InputError naming the first line of another form.
     """
     count = len(fields) - 1
 
@@ -92,13 +93,13 @@ def refuse_twice(where: object, name: str, M: Any) -> None:
 
 
 def one_sided(K: sp.csr_array) -> bool:
-    """Whether K has entries off the diagonal, and of no pair (i, j), (j, i) both."""
+    """Whether K has entries off the diagonal, but never both (i, j) and (j, i)."""
     pairs = _pattern(K).multiply(_pattern(K).T)
     return bool(pairs.nnz == np.count_nonzero(_pattern(K).diagonal()) < K.nnz)
 
 
 def mirrored(M: sp.csr_array, sign: int = 1) -> sp.csr_array:
-    """M with each entry that is listed on one side of the diagonal alone on the other, too."""
+    """M with each entry that only one side of the diagonal has copied to the other side, times `sign`."""
     alone = _pattern(M) - _pattern(M).multiply(_pattern(M).T)
     return sp.csr_array(M + sign * M.multiply(alone).T)
 
@@ -114,7 +115,7 @@ def contradictions(K: sp.csr_array, sign: int = 1) -> list[tuple[int, int]]:
 def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequence[str] | None = None) -> None:
     """Raise InputError if K (n, n), finite, is asymmetric, or has Abaqus' mark on its diagonal.
 
-    name, rows : of the matrix and its rows in the file.
+    name, rows : the names of the matrix and of its rows in messages.
     """
 
     def entry(i: int, j: int) -> str:

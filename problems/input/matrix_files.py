@@ -1,5 +1,4 @@
-"""Files of matrices: several in one .npz, or one in Matrix Market's format; and the apparent precision of a
-matrix's entries, with its effect on the displacements.
+"""Reads and writes files of matrices, .npz and Matrix Market, and estimates the precision of their entries.
 
 In an .npz a sparse matrix X is its compressed columns, X_data, X_indices, X_indptr and X_shape; SciPy's own
 files of one sparse matrix are read too.
@@ -29,13 +28,13 @@ KINDS = {"real": float, "double": float, "integer": np.int64, "unsigned-integer"
 SIGNS = {"general": None, "symmetric": 1, "hermitian": 1, "skew-symmetric": -1}
 BANNER = "%%matrixmarket"
 HEADER = re.compile(rf"{BANNER}\s+matrix\s+(coordinate|array)\s+(\S+)\s+({'|'.join(SIGNS)})")
-#: What a line holds.
+#: The numbers of a line.
 LAYOUTS = {"coordinate": ("row", "column", "entry"), "array": ("entry",)}
 Choose = Callable[[Sequence[str]], Sequence[str]]
 
 
 def damage(error: Exception) -> str:
-    """What is wrong with a file, in words: without Python's, which a library raises for whatever it meets."""
+    """The words for what is wrong with a file, free of the Python terms in a library's exceptions."""
     plain = isinstance(error, ValueError | OSError | Warning) and not isinstance(error, UnicodeError)
     if not plain or any(words in str(error) for words in ("invalid literal", "pickled", "itemsize")):
         return "damaged, or of another format"
@@ -43,7 +42,7 @@ def damage(error: Exception) -> str:
 
 
 def packed(arrays: Mapping[str, Any]) -> dict[str, Any]:
-    """Arrays by name, of sparse matrices their parts."""
+    """Arrays by name; a sparse matrix becomes its four parts."""
     flat: dict[str, Any] = {}
     for name, M in arrays.items():
         if sp.issparse(M):
@@ -61,15 +60,15 @@ def unpacked(arrays: Mapping[str, Any], name: str) -> sp.csc_array:
 
 
 def write(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Arrays and sparse matrices by name."""
+    """Write arrays and sparse matrices, by name, into an .npz."""
     with path.open("wb") as file:
         np.savez(file, **packed(arrays))
 
 
 def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
-    """The arrays of a file that are chosen from all names in it; SciPy's matrix is named by the file's stem.
+    """Read the arrays of an .npz that `choose` picks from their names; SciPy's matrix has the file's stem.
 
-    expected : names that are there whatever they hold; others need numbers, and a dimension.
+    expected : names that are offered whatever the array holds; other arrays must hold numbers.
     Raises ValueError if the parts of a sparse matrix do not fit together, InputError if one lists an entry
     twice, and what NumPy and zipfile raise.
     """
@@ -120,7 +119,7 @@ def _refuse_damaged(name: str, M: Any) -> None:
 
 
 def mtx_header(path: Path) -> tuple[list[str], list[int], int, bytes]:
-    """Of a Matrix Market file: layout, field and symmetry, the sizes, their line, and all lines after them.
+    """The header of a Matrix Market file: layout, field and symmetry; the sizes, their line, the lines after.
 
     Raises InputError.
     """
@@ -141,7 +140,7 @@ def mtx_header(path: Path) -> tuple[list[str], list[int], int, bytes]:
 
 
 def read_mtx(path: Path) -> Any:
-    """A Matrix Market file, array or sparse.
+    """Read a Matrix Market file, as an array or a sparse matrix.
 
     Raises InputError for a line that does not hold one entry, or one of an entry that is listed twice, and
     ValueError if entries are missing or of another kind. SciPy's reader takes missing entries for zeros,
@@ -180,10 +179,10 @@ FEWEST = 6  # digits that a program prints
 
 
 def apparent_digits(values: Vector) -> int:
-    """The smallest d with every value equal to itself rounded to d significant digits, at most 16.
+    """The number d ≤ 16 of significant digits: the smallest d to which rounding leaves all values unchanged.
 
-    7 if all values are in single precision, also as decimals of more digits. 16 for integers, unless all end
-    in zeros after six digits or more. Examines a sample of 20 000.
+    It is 7 if all values are in single precision, also as decimals of more digits. It is 16 for integers,
+    unless all end in zeros after six digits or more. A sample of 20 000 values is examined.
     """
     v = values[values != 0]
     if len(v) > SAMPLE_SIZE:
@@ -198,7 +197,7 @@ def apparent_digits(values: Vector) -> int:
 
 
 def _are_rounded(values: Vector, exact: Vector, digits: int) -> bool:
-    """Whether the values are exact ones rounded to so many significant digits; at 16 not rounded at all."""
+    """Whether rounding `exact` to so many significant digits gives the values; 16 digits are no rounding."""
     if digits == DOUBLE:
         return np.array_equal(values, exact)
     pairs = zip(values.tolist(), exact.tolist(), strict=True)

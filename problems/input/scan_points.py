@@ -1,15 +1,15 @@
-"""Points of a scan: two at one place, and gaps that are hardly measured ones.
+"""Checks points of a scan: two at one place, and gaps that are unlikely to be measured.
 
 A gap is an outlier by one of these rules, in mm, with s = 1.4826 · median |gap − median|:
 
     far      it is more than 20 s + 5 from the median
-    alone    of nine points or more: fewer than two of its eight nearest have a gap within max(20 d, 3 q, 0.3)
-             of its own: q is the distance of their quartiles, d the median over all points of the distance
-             from the gap to that of the eight which is second closest to it
-    below    it is negative, and it and its equals are more than 2 s + 0.1 below all others
+    alone    among nine points or more, at most one of its eight neighbours has a gap within
+             max(20 d, 3 q, 0.3) of its own. q: the distance between the quartiles of the neighbours' gaps.
+             d: the second smallest difference to a neighbour's gap, the median of that over all points
+    below    it is negative, and it and equal ones are more than 2 s + 0.1 below all others
 
-Marks of a scanner that saw nothing are of these kinds: 9999, 32767, 1e30, −1. Noise, steps, pockets and bumps
-that several points show are not.
+These rules catch the marks of a scanner that saw nothing: 9999, 32767, 1e30, −1. They leave noise, and steps,
+pockets and bumps that several points show.
 """
 
 from __future__ import annotations
@@ -23,14 +23,16 @@ from problems.forms.assembly import Indices, Mask, Matrix, Vector
 CLOSE = 0.01  # mm: points that are closer are at one place
 NEAR, ALIKE = 8, 2
 SPREADS, QUARTILES, ALONE, BELOW, FAR = 20.0, 3.0, 0.3, 0.1, 5.0
-MAD = 1.4826  # of a normal distribution: σ / median |z|
+MAD = 1.4826  # σ / median |z| of a normal distribution
 SMALL = 0.02  # of the joint's size
 SHOWN = 10
 
 
 def crowded(points: Matrix) -> list[tuple[int, int]]:
-    """Pairs (i, k), i < k, of points (n, 2) at one place: the first two of equal ones, and each place with
-    the nearest other one. A scanner that saw nothing may write thousands of equal points.
+    """Pairs (i, k), i < k, of points (n, 2) at one place.
+
+    Of equal points the first two are a pair, as a scanner that saw nothing may write thousands of them. Of
+    different points each is paired with the nearest other one, if that is close.
     """
     from scipy.spatial import cKDTree
 
@@ -52,7 +54,7 @@ def neighbours(points: Matrix) -> Indices:
 
 
 def outliers(gaps: Vector, near: Indices | None = None) -> Mask:
-    """(n,) which gaps are. near : `neighbours` of their points; without them `alone` is not tested."""
+    """(n,) which gaps are outliers. near : the `neighbours` of their points, which `alone` needs."""
     middle = np.median(gaps)
     s = MAD * np.median(abs(gaps - middle))
     is_outlier = abs(gaps - middle) > SPREADS * s + FAR
@@ -69,7 +71,7 @@ def outliers(gaps: Vector, near: Indices | None = None) -> Mask:
 
 
 def unlike(points: Matrix) -> Iterator[tuple[int, str]]:
-    """Of the points (n, 3), x, y and gap, those that are no measured ones, and what is usual."""
+    """Yield the outliers among points (n, 3), x, y and gap: the index of the point, and what is usual."""
     if len(points) < 3:
         return
     near = neighbours(points[:, :2])
@@ -85,6 +87,6 @@ def unlike(points: Matrix) -> Iterator[tuple[int, str]]:
 
 
 def too_small(points: Matrix, bounds: Matrix) -> str:
-    """A question, if the points (n, 2) span a small part of the joint within its bounds (2, 2)."""
+    """A question about metres, if points (n, 2) span little of the bounds (2, 2) of a joint, else ""."""
     small = (np.ptp(points, axis=0) < SMALL * np.ptp(bounds, axis=0)).all()
     return " (are x and y of the points in metres?)" if small else ""

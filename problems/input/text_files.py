@@ -1,4 +1,4 @@
-"""Text from any program: compressed or not, any line ends, its encoding checked before a reader sees it.
+"""Reads text from any program: compressed or not, with any line ends; the encoding is checked first.
 
 A file is UTF-8, with or without a byte order mark, or gzip of that; old line ends become \\n. UTF-16 and
 UTF-32 are refused by name. Where only headings and comments can hold foreign letters, bytes that are not
@@ -30,7 +30,7 @@ START = 64  # bytes in which UTF-16 without a mark shows
 def read_bytes(path: Path, key: str, mib: float) -> bytes:
     """The bytes of a text file, decompressed, without a byte order mark, lines ended by \\n.
 
-    key, mib : as of `regular_file`. Raises InputError.
+    key, mib : see `regular_file`. Raises InputError.
     """
     try:
         content = regular_file(path, key, mib).read_bytes()

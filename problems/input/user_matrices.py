@@ -1,6 +1,4 @@
-"""A user's own K, A, f, g: from one .npz, from Matrix Market files, or as arrays; read and checked once, then
-from the cache.
-"""
+"""A user's own K, A, f, g: from an .npz, Matrix Market files, or arrays; checked once, then cached."""
 
 import time
 from bisect import bisect_left
@@ -38,10 +36,10 @@ SLIGHT = 1e-6  # of the largest: a coefficient that is rounding
 def stored_matrices(
     files: dict[str, Path], files_key: str, sparse: bool
 ) -> tuple[Assembly, LoadCase, float, str]:
-    """The assembly, its blocks dense and memory-mapped or `sparse`, the load case, the seconds that reading
-    took, and the key.
+    """The assembly and the load case of files, the seconds that reading took, and the key of the assembly.
 
-    files_key : a hash of the files' content. Raises InputError.
+    files_key : `content_key` of the files. sparse : whether K's blocks are sparse, else dense and
+    memory-mapped. Raises InputError.
     """
     code = fingerprint([Path(__file__)], within=("problems/input",))
     key = storage.digest("own", files_key, sparse, code)
@@ -72,7 +70,7 @@ def content_key(files: Mapping[str, Path]) -> str:
 
 
 def holds_sparse(files: dict[str, Path]) -> bool:
-    """Whether K is stored as a sparse matrix, and large; a file that cannot be read does not."""
+    """Whether K is stored as a large sparse matrix; False if the file cannot be read."""
     try:
         if "problem" in files:
             with np.load(files["problem"]) as archive:
@@ -112,11 +110,11 @@ def checked(
 ) -> tuple[Assembly, LoadCase]:
     """K, A (dense or sparse), f, g and perhaps nodes as an assembly and a load case.
 
-    where : the file or the argument that each comes from. Raises InputError with all faults.
+    where : the file or the argument of each matrix. Raises InputError with all faults.
     """
 
     def refuse(faults: Iterable[tuple[str, str, object, str]]) -> None:
-        """Raise InputError, if there are faults: matrix, key, value, what is allowed."""
+        """Raise InputError if there are faults: (matrix, key, value, what is allowed)."""
         found = [Fault(where.get(matrix, "matrices"), *fault) for matrix, *fault in faults]  # type: ignore
         if found:
             raise InputError(found)
@@ -191,7 +189,7 @@ def _wrong_units(K: sp.csr_array, A: sp.csr_array) -> Faults:
 
 
 def _wrong_strays(data: Mapping[str, Any], shape: tuple[int, int]) -> Faults:
-    """Arrays that may be meant as a part of a problem with A of this shape; answers and ids are not."""
+    """Yield the arrays that may be meant as a part of a problem with A (n, m) of this shape."""
     allowed = "is no part of a problem: a bound is a column of A with its g; take out what is not meant"
     for key, M in data.items():
         if key not in ("x", "lam") and (M.ndim == 2 or M.dtype.kind in "fc") and {*M.shape} & {*shape}:
@@ -211,9 +209,9 @@ def _fits(numbers: Any) -> bool:
 
 
 def refuse_dependent(A: sp.csc_array, where: object, name: Callable[[int], str] = "A[:, {}]".format) -> None:
-    """Raise InputError naming the first column of A (n, m), none zero, that depends on others before it.
+    """Raise InputError naming the first column of A (n, m), none zero, that depends on earlier columns.
 
-    By the pivots of AᵀA = LLᵀ, l_jj² = min_z ‖a_j − Σ_{i<j} z_i a_i‖₂². AᵀA is block diagonal, a block per
+    The pivots of AᵀA = LLᵀ tell: l_jj² = min_z ‖a_j − Σ_{i<j} z_i a_i‖₂². AᵀA is block diagonal, a block per
     group of contacts that share unknowns, and is factored as a band or a sparse matrix. The rounding of l_jj²
     is some k + (entries of a_j) ulps of ‖a_j‖₂² in a group of k contacts, times ‖z‖².
     """

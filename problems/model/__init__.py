@@ -1,1 +1,1 @@
-"""A joint, its parts as finite elements, what an effect is; the model of a scene, whole or condensed."""
+"""Joints, their parts as finite elements, the base classes of effects, and the model of a scene."""

@@ -1,8 +1,8 @@
-"""The unknowns of the full model, numbered so that K̂ has a narrow band.
+"""Numbers the unknowns of the full model so that K̂ has a narrow band.
 
-The unknowns û of a part are those of its plate that are not built in: deflection, slopes and twist at each
-node. They are numbered line by line across the shorter direction of the grid, and the parts that springs
-join alternate line by line: K̂_ij ≠ 0 only for unknowns of one line or of neighbouring lines.
+The unknowns û of a part are the deflection, slopes and twist at each node of its plate that is not built in.
+They are numbered line by line across the shorter direction of the mesh, and the parts that springs join
+alternate line by line: K̂_ij ≠ 0 only for unknowns of one line or of neighbouring lines.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from .part import PartModel
 
 @dataclass(frozen=True)
 class Numbering:
-    """places : for each part (plate.size,), the number of each of its plate's unknowns; −1 where built in.
+    """The numbers of the unknowns of all parts.
 
+    places : for each part (plate.size,), the number of each of its plate's unknowns; −1 where built in.
     sizes : the number of unknowns of each diagonal block of K̂.
     """
 
@@ -29,7 +30,7 @@ class Numbering:
 
     @classmethod
     def of(cls, models: Sequence[PartModel], blocks: Sequence[Sequence[int]]) -> Numbering:
-        """Of parts in blocks; the parts of a block have consecutive numbers, in the order of the blocks."""
+        """Number the parts block by block; the unknowns of a block have consecutive numbers."""
         places = [np.full(model.plate.size, -1) for model in models]
         sizes, offset = [], 0
         for block in blocks:
@@ -58,14 +59,14 @@ def free_unknowns(model: PartModel) -> Indices:
 
 
 def lines_across(model: PartModel) -> list[Indices]:
-    """The unknowns on each grid line across the longer direction of a part that are not built in."""
+    """The unknowns that are not built in, on each mesh line across the longer direction of a part."""
     free = free_unknowns(model)
     line = min(_grid_lines(model, free), key=_widest)
     return [free[line == k] for k in range(line.min(), line.max() + 1)]
 
 
 def _grid_lines(model: PartModel, unknowns: Indices) -> tuple[Indices, Indices]:
-    """The number of the grid line x = const, and that of y = const, on which each unknown lies."""
+    """The number of the mesh line x = const, and of the line y = const, on which each unknown lies."""
     nx, ny = len(model.plate.x), len(model.plate.y)
     iy, _, ix, _ = np.unravel_index(unknowns, (ny, 2, nx, 2))
     # Parts have a common x and, from the junction on, a common y: lines of equal number lie side by side.
@@ -73,5 +74,5 @@ def _grid_lines(model: PartModel, unknowns: Indices) -> tuple[Indices, Indices]:
 
 
 def _widest(lines: Indices) -> int:
-    """The most unknowns on a line of these numbers."""
+    """The largest number of unknowns on one line."""
     return int(np.bincount(lines - lines.min()).max())

@@ -1,12 +1,11 @@
-"""Static condensation of a part onto its junction nodes (superelement), by nested dissection; the cache keeps
-it.
+"""Condenses a part statically onto its junction nodes, by nested dissection; the cache keeps the result.
 
-With kept unknowns j and the others i, S = K_jj − K_ji K_ii⁻¹ K_ij. Grid lines across a part couple only to
-their neighbours, so that a line separates what lies on both sides. A stretch of the part is halved at its
-middle line; the halves, condensed onto their kept unknowns and their end lines, meet there, and the middle
-line's other unknowns are eliminated by a Cholesky factorisation (George, SIAM J. Numer. Anal. 10:345–363,
-1973). For w unknowns per line and k kept ones these are about 2wk² operations, of matrices by matrices, where
-a front that travels along the part makes wk² for each of some lines.
+With kept unknowns j and the others i, S = K_jj − K_ji K_ii⁻¹ K_ij. Mesh lines across a part couple only to
+their neighbours, so that a line separates its two sides. A stretch of the part is halved at its middle line.
+Each half is condensed onto its kept unknowns and its end lines. The halves meet at the middle line, whose
+other unknowns a Cholesky factorisation eliminates (George, SIAM J. Numer. Anal. 10:345–363, 1973). For w
+unknowns per line and k kept ones these are about 2wk² operations, all in products of matrices. A front that
+travels along the part takes wk² operations per line.
 """
 
 import inspect
@@ -47,7 +46,7 @@ def condense(
     K : (N, N) symmetric positive definite, coupling only within a line and to the next.
     lines : the unknowns of each line, in their order.
     keep : (N,) bool.
-    part : its name, for the reporter.
+    part : the part's name for the reporter.
 
     Returns
     -------
@@ -64,8 +63,9 @@ def condense(
     done = itertools.count(1)
 
     def stretch(first: int, last: int) -> Matrix:
-        """The lower triangle of S on the first line, the kept unknowns between and the last line, where K has
-        no entries within these two lines yet.
+        """The lower triangle of S of a stretch: its first line, the kept unknowns between, its last line.
+
+        It lacks the entries of K within these two lines.
         """
         if last == first + 1:
             a, b = split[first], split[last]
@@ -115,7 +115,7 @@ def part_key(part: PartModel) -> str:
 def condensed_stiffness(key: str, part: PartModel, reporter: Reporter, name: str) -> tuple[Matrix, float]:
     """The part's stiffness on the junction nodes, (node_count, node_count) N/mm, x running fastest.
 
-    key : that of the part; name : for the reporter. Also returns the seconds of the computation.
+    key : `part_key` of the part. name : the part's name for the reporter. Also returns the seconds taken.
     Raises NotPositiveDefinite if some motion of the part costs no energy.
     """
 
@@ -142,9 +142,9 @@ def condensed_load(
 ) -> Vector:
     """(node_count,) forces in N on the junction nodes: f_j − K_ji K_ii⁻¹ f_i, j the deflections there.
 
-    A load on the whole part and its condensation push the junction nodes alike: the work of f_i on the
-    motions that the junction imposes goes to f_j, and its work on the others does not move the junction.
-    interior : i and K_ii, asked for if the load is not in the cache.
+    The condensed load moves the junction as the load on the whole part does: f_j gains the work of f_i on
+    the motions that the junction imposes, and the rest of f_i moves interior nodes alone.
+    interior : returns i and K_ii; called if the load is not in the cache.
     """
     code = fingerprint([Path(inspect.getfile(type(effect))), Path(__file__)], within=CODE)
     key = storage.digest("load", part_key(part), effect.model_dump(mode="json", exclude={"part"}), code)

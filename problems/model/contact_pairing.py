@@ -1,7 +1,7 @@
-"""The contacts of two faces: each node of the first with its foot on the second.
+"""Pairs the contact nodes of one face with their feet on another.
 
-The foot of p along its normal n is p + tn, at the height of the second face there; both faces are given in
-the axes of the junction's plane, whose third one is the height.
+The foot of a node p along its normal n is p + tn, where that line meets the second face. Both faces are in
+the axes of the junction's plane; the third coordinate is the height above it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ STEPS, SETTLED = 50, 1e-10  # of the search for a foot; mm
 
 @dataclass(frozen=True)
 class Face:
-    """xyz (c, 3) mm and normals (c, 3) of contact nodes; the surface through them, seen from above."""
+    """The contact nodes of a part: xyz (c, 3) mm, normals (c, 3), and the surface through them from above."""
 
     xyz: Matrix
     normals: Matrix
@@ -30,10 +30,12 @@ class Face:
 
 @dataclass(frozen=True)
 class Pairing:
-    """Of faces a and b. nodes (c,) : the contacts, as nodes of a. W (c, nodes of b) : weights of their feet.
+    """The contacts of two faces a and b, and the nodes of a that are none.
 
-    apart (c,) : t, mm. beyond : how many nodes of a have no foot on b. far : those too far from it, by t.
-    crossed : triangles of a whose feet go round the other way. lost : nodes near b whose foot was not found.
+    nodes (c,) : the contacts, as nodes of a. W (c, nodes of b) : the weights of b's nodes at their feet.
+    apart (c,) : their distances t, mm. beyond : the number of nodes of a without a foot on b. far : t, mm, of
+    each node that is too far from b. crossed : triangles of a whose feet have the other orientation.
+    lost : nodes near b for which no foot was found.
     """
 
     nodes: Indices
@@ -46,13 +48,13 @@ class Pairing:
 
 
 def with_tool(a: Face) -> Pairing:
-    """Every node, without a second face."""
+    """The contacts of a face with a rigid tool: all nodes, without feet."""
     count = len(a.xyz)
     return Pairing(np.arange(count), sp.csr_array((count, 0)), np.zeros(count))
 
 
 def paired(a: Face, b: Face, distance: float) -> Pairing:
-    """distance : up to which |t| two surfaces may touch, mm."""
+    """The contacts of two faces. distance : the largest |t| of a contact, mm."""
     t, foot, has_foot, away = _feet(a, b)
     on = has_foot & b.surface.covers(foot)
     near = on & (abs(t) <= distance)
@@ -69,10 +71,11 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
 
 
 def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask, Vector]:
-    """t (c,), the feet (c, 2), which were found, how far b's nearest node is: from that by Newton's method.
+    """The feet of a's nodes on b, by Newton's method from b's nearest node.
 
-    At q = p + tn, b is the plane through its point above q with its normal m there, or beyond its surface
-    that of the node nearest to q: t changes by r·m / n·m, with r from q to the point.
+    At q = p + tn, b is replaced by a plane: the one through its point above q with its normal m there, or
+    beyond its surface the one of the node nearest to q. t changes by r·m / n·m, with r from q to that point.
+    Returns t (c,), the feet (c, 2), whether each was found, and the distance of b's nearest node (c,).
     """
     from scipy.spatial import cKDTree
 

@@ -1,4 +1,4 @@
-"""The [[effect]] tables of a scene and the CSV files that they name, read into effects; all their faults."""
+"""Reads the [[effect]] tables of a scene, with the CSV files that they name, into effects."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ EXCLUDED = {
 
 @dataclass
 class EffectTable:
-    """A table, its file and index, its effect (None if invalid), and the rows of the file that it names.
+    """An [[effect]] table at a place in a file, the effect made of it, and the rows of its CSV file.
 
-    If that has bad rows, the effect is made of the good ones, so that these and the other parameters are
-    still checked.
+    effect : None if the table is invalid. If the CSV has bad rows, the effect is made of the good ones, so
+    that these and the other parameters are still checked.
     """
 
     where: Path
@@ -53,7 +53,7 @@ class EffectTable:
     rows: Rows | None = None
 
     def read(self) -> Iterator[Fault]:
-        """Make the effect; yields the faults of the table by itself."""
+        """Make the effect; yield the faults that the table has without regard to the joint."""
         kind = self.content.get("kind")
         if kind not in effect_kinds():
             allowed = unknown("effect", kind, effect_kinds())
@@ -127,7 +127,7 @@ class EffectTable:
                 yield Fault(str(self.where), f"{self._name}.{key}", value, allowed)
 
     def _is_consequence(self, key: str) -> bool:
-        """Whether a fault of all points, or of the whole table, may result from bad rows of a file."""
+        """Whether a fault of all points, or of the whole table, may be due to bad rows of the file."""
         return bool(self.rows and self.rows.faults and key in ("", "points"))
 
 

@@ -1,4 +1,4 @@
-"""What effects, pictures and commands know of a joint, whether of plates or of superelements."""
+"""The interface of a joint, of plates or of superelements, to effects, pictures and commands."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class AnyJoint(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the parts."""
+        """The names of the parts."""
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -47,7 +47,7 @@ class AnyJoint(Protocol):
 
     @property
     def content(self) -> Any:
-        """All that determines K and A without effects, as JSON, for keys."""
+        """The data that determine K and A without effects, as JSON, for keys."""
 
     @property
     def shown(self) -> sp.csr_array | None:
@@ -58,7 +58,7 @@ class AnyJoint(Protocol):
         """The ids of the nodes at which Dx is given, and of the node of each contact; None without ids."""
 
     def with_contacts(self, pairs: tuple[Pair, ...]) -> AnyJoint:
-        """The same with these contacts."""
+        """The same joint with these contacts."""
 
     def unknowns(self, part: str) -> slice:
         """The part's displacements, as a slice of x."""
@@ -67,7 +67,7 @@ class AnyJoint(Protocol):
         """The contacts of a pair, as a slice of g and λ."""
 
     def places(self, pair: Pair) -> Matrix:
-        """(c, 2) its contacts."""
+        """(c, 2) the points of a pair's contacts."""
 
     def nodes_of(self, part: str) -> Matrix:
         """The nodes (c, 2) at which Dx is given."""
@@ -76,8 +76,8 @@ class AnyJoint(Protocol):
         """(k,) which points are on all of these parts."""
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
-        """W (k, unknowns of the part): its displacements at points along the normal of the part `along`, by
-        default its own. Wᵀp are nodal forces of forces p at the points.
+        """W (k, unknowns of the part): Wu are the part's displacements at points, Wᵀp the nodal forces of
+        forces p there, both along the normal of the part `along`, by default of `part`.
         """
 
     def areas(self, part: str) -> Vector:
@@ -90,10 +90,10 @@ class AnyJoint(Protocol):
         """W (k, len(y) len(x)): Wz are the values at points (k, 2), mm, of a field z on that grid."""
 
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
-        """(c,) at the contacts of a pair, from values (len(y), len(x)) on that grid."""
+        """(c,) the values at the contacts of a pair of a field (len(y), len(x)) on that grid."""
 
     def plate_of(self, part: str) -> Plate | None:
-        """Its finite elements; None of a superelement."""
+        """The finite elements of a part; None of a superelement."""
 
     def outline(self, part: str) -> tuple[list[float], tuple[str, ...]]:
         """[west, east, south, north] of the whole part, mm, and its edges that are clamped."""
@@ -102,10 +102,10 @@ class AnyJoint(Protocol):
         """A (n, m)."""
 
     def faults(self) -> Faults:
-        """Those that the types cannot catch."""
+        """Yield the faults that the types cannot catch: key, value, what is allowed."""
 
     def unusual(self) -> Faults:
-        """What may be, but is rarely meant: key, value, what is usual."""
+        """Yield values that are possible but rarely meant: key, value, what is usual."""
 
 
 def extent(bounds: Matrix) -> str:
@@ -115,18 +115,18 @@ def extent(bounds: Matrix) -> str:
 
 
 def on_part(plate: Plate) -> str:
-    """What is allowed for a point that is off a part, for messages."""
+    """The words for the points of a part, for messages."""
     return f"on the part, {extent(plate.bounds)}"
 
 
 def on_junction(joint: AnyJoint) -> str:
-    """What is allowed for a point that is off the junction, for messages."""
+    """The words for the points of a junction, for messages."""
     bays = "" if joint.plate_of(joint.names[0]) else ", not in a bay or a hole of a part"
     return f"on the junction, {extent(joint.bounds)}{bays}"
 
 
 def across(joint: AnyJoint, rows: Mapping[str, sp.sparray], count: int) -> sp.csr_array:
-    """(count, n) of rows (count, unknowns of the part) on some parts, zero on the others."""
+    """(count, n) rows over all unknowns, from rows (count, unknowns of the part) on some parts."""
     spans = {part: joint.unknowns(part) for part in joint.names}
-    none = {part: sp.csr_array((count, own.stop - own.start)) for part, own in spans.items()}
+    none = {part: sp.csr_array((count, span.stop - span.start)) for part, span in spans.items()}
     return sp.csr_array(sp.hstack([rows.get(part, none[part]) for part in joint.names]))

@@ -36,7 +36,7 @@ Faults = Iterator[tuple[str, object, str]]
 
 
 class Table(BaseModel):
-    """A table of a TOML file: unknown keys are errors."""
+    """A table of a TOML file; unknown keys in it are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -150,14 +150,15 @@ class Joint(Table):
         return Grid(self.x, self.y)
 
     def weights(self, points: Matrix) -> sp.csr_array:
-        """W (k, node_count), bilinear on each element: Wv are the values at points (k, 2) in mm of a field
-        with the values v at the junction nodes; Wᵀp are nodal forces with the resultant and moments of forces
-        p at the points.
+        """W (k, node_count) of points (k, 2), mm, bilinear on each element.
+
+        Wv are the values at the points of a field with the values v at the junction nodes. Wᵀp are nodal
+        forces with the resultant and the moments of forces p at the points.
         """
         return self.surface.weights(points)
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
-        """All normals are those of the junction."""
+        """The weights of the points, as all normals are that of the junction."""
         return self.weights(points)
 
     def covers(self, parts: tuple[str, ...], points: Matrix) -> Mask:
@@ -228,7 +229,7 @@ class Joint(Table):
         return Plate(self.x, np.concatenate(y), part.thickness, part.young, part.poisson)
 
     def faults(self) -> Faults:
-        """Those that the types cannot catch."""
+        """Yield the faults that the types cannot catch."""
         for part in self.part:
             for edge in part.clamped:
                 if getattr(part, edge) is None:
@@ -236,7 +237,7 @@ class Joint(Table):
         yield from wrong_contacts(self.names, self.contacts, self.pairs)
 
     def unusual(self) -> Faults:
-        """What may be, but is rarely meant: key, value, what is usual."""
+        """Yield values that are possible but rarely meant: key, value, what is usual."""
         length, width = self.junction.length, self.junction.width
         if max(length, width) < SHORT:
             yield "junction.length", length, f"at least {SHORT:g} mm: are these metres?"
@@ -256,9 +257,10 @@ class Joint(Table):
 def wrong_contacts(
     names: Sequence[str], contacts: Sequence[Pair], pairs: Sequence[Pair], at_one_place: bool = True
 ) -> Faults:
-    """Of parts of these names. contacts : those that are named; pairs : those that there are.
+    """Yield the faults of names of parts and of contacts.
 
-    at_one_place : whether all pairs meet at the same nodes, so that one of a closed chain follows from the
+    contacts : the pairs that the scene names. pairs : all pairs, the default ones and those of effects too.
+    at_one_place : whether all pairs meet at the same nodes. One pair of a closed chain then follows from the
     others, and Q = AᵀK⁻¹A is singular.
     """
     parts = list(names)

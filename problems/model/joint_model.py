@@ -2,8 +2,8 @@
 
     min ½ûᵀK̂û − f̂ᵀû   subject to   Bᵀû ≤ g
 
-The sparse form takes it as it is. The dense forms condense it part by part onto the junction, which is exact:
-û at the junction is x, and the multipliers λ are those of min ½xᵀKx − fᵀx, Aᵀx ≤ g.
+The sparse form is this problem. The dense forms condense it part by part onto the junction, which is exact: û
+at the junction is x, and the multipliers λ are those of min ½xᵀKx − fᵀx, Aᵀx ≤ g.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .scene import JointScene
 from .springs import Springs
 
 CODE = ("problems/model", "problems/effects")
-WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
+WORTH = 0.5  # of `work`: a coarser model that needs more is not used
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class JointModel:
 
     @property
     def work(self) -> float:
-        """What the inverse near the diagonal costs, as far as it depends on the grid lines: Σ (lines)³."""
+        """The cost of the inverse near the diagonal, as it grows with the mesh lines: Σ (lines)³."""
         return float(sum(len(part.free_lines) ** 3 for part in self.parts))
 
     @cached_property
@@ -170,7 +170,7 @@ class JointModel:
         return nodes
 
     def interior(self, k: int) -> tuple[Indices, SparseBlock]:
-        """The unknowns i of a part that condensation eliminates, in the order of a narrow band, and K_ii."""
+        """The unknowns i of a part that condensation eliminates, ordered for a narrow band, and K_ii."""
         if k not in self._interiors:
             part = self.parts[k]
             i = part.others[np.argsort(self.numbering.places[k][part.others])]
@@ -182,8 +182,8 @@ class JointModel:
         return {}
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
-        """K and A, memory-mapped from the cache or computed now: a dense block of K for each part, or for
-        parts from the first to the last that springs join. Raises InputError as `sparse` does.
+        """K and A, from the cache or computed now; a dense block of K for each part, or for a range of parts
+        that springs join. Raises InputError as `sparse` does.
         """
         from .condensation import condensed_stiffness, part_key  # of the dense forms only
 

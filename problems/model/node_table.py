@@ -88,7 +88,7 @@ def _wrong_nodes(
 
 
 def outliers(xyz: Matrix) -> Indices:
-    """The nodes whose nearest neighbour is ten times as far away as this one's own nearest neighbour."""
+    """The nodes ten times farther from their nearest neighbour than that is from its own nearest one."""
     from scipy.spatial import cKDTree
 
     away, nearest = (column[:, 1] for column in cKDTree(xyz).query(xyz, k=2))

@@ -1,13 +1,13 @@
-"""One part as finite elements: its plate, what stiffens and holds it, and where it meets the others.
+"""One part as finite elements: its plate, the effects that stiffen, hold or load it, and its junction lines.
 
 All models of a part (condensed stiffness, condensed loads, the model without condensation) take its unknowns
 from here: the deflections at the junction nodes, those at built-in edges, and the others.
 
-A coarser model, for a preconditioner, has fewer grid lines beyond the junction. With K̂' = PᵀK̂P, where P
-interpolates in a subset of the grid lines y = const, the compliance of the junction changes little (on long
-parts by 5e-4 of itself, on short strips by up to 1e-2) if the lines are close together near the junction,
-where the short waves are, and those of stiff beams and supports are kept. A band across the part is then half
-as wide, and what costs its cube an eighth.
+A coarser model, for a preconditioner, has fewer mesh lines beyond the junction: K̂' = PᵀK̂P, where P
+interpolates in a subset of the lines y = const. Lines stay close near the junction, where the short waves
+are, and lines of stiff beams and supports are kept. The compliance of the junction then changes by 5e-4 of
+itself on long parts and up to 1e-2 on short strips. A band across the part is half as wide, so that work that
+grows with its cube falls to an eighth.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from .plate import WHOLE, LineLoads, Plate, line_loads
 
 @dataclass(frozen=True)
 class PartModel:
-    """A part's plate and what stiffens and holds it.
+    """A part's plate and the effects that stiffen and hold it.
 
-    junction : the grid lines y = const of the junction. clamped : those that are built in.
-    geometry : what it was made from, but for its name and its effects, for keys; of a model from a joint.
+    junction : the mesh lines y = const of the junction. clamped : the lines that are built in.
+    geometry : the tables of the junction and of the part without its name, for keys; empty if made without.
     """
 
     plate: Plate
@@ -44,7 +44,7 @@ class PartModel:
 
     @classmethod
     def of(cls, joint: Joint, part: Part, effects: tuple[StiffnessEffect, ...]) -> PartModel:
-        """The model of a part; of `effects`, those that act on it count."""
+        """The model of a part with those of the effects that act on it."""
         plate = joint.plate(part)
         first = part.south.elements if part.south else 0
         edges = {"south": 0, "north": len(plate.y) - 1}
@@ -87,7 +87,7 @@ class PartModel:
         return np.flatnonzero(~held)
 
     def areas(self) -> Iterator[tuple[float, float, LineLoads, LineLoads]]:
-        """(sign, thickness, loads along x, loads along y), whose sum is the part with its pads."""
+        """Yield (sign, thickness, loads along x, loads along y); their sum is the part with its pads."""
         plate = self.plate
         areas = [(1.0, plate.thickness, WHOLE, WHOLE)]
         for thickness, x, y in (effect.pad for effect in self.effects if effect.pad):
@@ -126,7 +126,7 @@ class PartLoadEffect(ElementEffect):
 
 
 GROWTH = 1.2  # of the distance between lines, away from the junction
-PEAK = 2.0  # times the median beyond the junction: the stiffness that effects add to a line that is kept
+PEAK = 2.0  # lines stay to which effects add more than PEAK times the median stiffness beyond the junction
 
 
 def graded(model: PartModel) -> PartModel:
@@ -151,7 +151,7 @@ def _graded(count: int) -> list[int]:
 
 
 def _stiff_lines(model: PartModel) -> set[int]:
-    """The lines to which effects add far more stiffness than to others: beams along them, and supports."""
+    """The lines to which effects add far more stiffness than to others, as beams along them or supports."""
     added = model.added.diagonal().reshape(len(model.plate.y), 2, -1, 2)[:, 0, :, 0].sum(axis=1)
     beyond = np.delete(added, model.junction)
     return set(np.flatnonzero(added > PEAK * np.median(beyond)).tolist()) if beyond.size else set()

@@ -24,9 +24,9 @@ LineLoads = tuple[Vector, Vector]
 
 @dataclass(frozen=True)
 class Plate:
-    """Grid and material of one part.
+    """The mesh and the material of one part.
 
-    x : (nx,) and y : (ny,) grid lines in mm, ascending. thickness in mm, young in N/mm².
+    x (nx,), y (ny,) : mesh lines in mm, ascending. thickness in mm, young in N/mm².
     Degree of freedom (iy, b, ix, a) has the index ((2 iy + b) nx + ix) 2 + a, where a and b count
     the derivatives along x and y: the lines y = const are contiguous.
     """
@@ -61,10 +61,10 @@ class Plate:
         return self.young / (2 * (1 + self.poisson))
 
     def stiffness(self, x: Range = WHOLE, y: Range = WHOLE) -> sp.csr_array:
-        """(size, size), N/mm and N: the bending stiffness of the free plate, of what lies in the ranges.
+        """The bending stiffness (size, size), N/mm and N, of the free plate within the ranges.
 
-        All terms have the same nonzero entries, those of nodes of a common element, so that their sum is
-        formed on the values alone, an entry of a one-dimensional matrix along y at a time; it is symmetric to
+        All terms have the same nonzero entries, those of nodes of a common element. Their sum is therefore
+        formed on the values alone, an entry of a one-dimensional matrix along y at a time. It is symmetric to
         the last bit.
         """
         X, Y = line_matrices(self.x, *x), line_matrices(self.y, *y)
@@ -90,14 +90,15 @@ class Plate:
         return sp.csr_array((values, columns, indptr), shape=(self.size, self.size))
 
     def evaluate(self, x: float, y: float, dx: int = 0, dy: int = 0) -> sp.csr_array:
-        """Row vector (1, size) that gives the deflection, or a derivative of it, at a point."""
+        """The row vector e (1, size) with e·(degrees of freedom) = deflection at a point, or a derivative."""
         return sp.kron(evaluate(self.y, y, dy), evaluate(self.x, x, dx)).tocsr()
 
     def beams(
         self, lines: Sequence[float], EI: float, GJ: float, along_x: bool, ends: Range = WHOLE
     ) -> sp.csr_array:
-        """Stiffness of beams along x, or y, at each of the lines between two ends: Σ EI ∫w_ss² + GJ ∫w_xy²,
-        N·mm², s along the beam.
+        """The stiffness of beams along x, or y, on each of the lines, between two ends.
+
+        Σ EI ∫ w_ss² ds + GJ ∫ w_xy² ds with s along the beam; EI and GJ in N·mm².
         """
         own, other = (self.x, self.y) if along_x else (self.y, self.x)
         line = line_matrices(own, *ends)
@@ -178,7 +179,7 @@ def line_matrices(grid: Vector, start: float = -np.inf, stop: float = np.inf) ->
 
 
 def evaluate(grid: Vector, at: float, derivative: int = 0) -> sp.csr_array:
-    """Row vector e (1, 2N): e·(degrees of freedom) is the field, or its derivative, at a point."""
+    """The row vector e (1, 2N) with e·(degrees of freedom) = the field at a point, or its derivative."""
     element = int(np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2))
     h = grid[element + 1] - grid[element]
     values = shape(np.array([(at - grid[element]) / h]), h, derivative)[:, 0]

@@ -1,4 +1,4 @@
-"""Effects at positions: points on the junction, between its nodes too."""
+"""The base class of effects at points of the junction, at its nodes or between them."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .joint import Faults, Table
 
 FORCES = ("preload", "clamping_force")  # keys of the effects that press at points
 MOST = 10_000  # points of a pattern
-TEARS = 400.0  # N/mm² of the square of a thickness: the yield stress of an aluminium alloy
+TEARS = 400.0  # N per mm² of thickness squared: the yield stress of an aluminium alloy
 
 
 class Pattern(Table):
     """columns × rows points, evenly spaced over the junction up to `edge` mm from its border; at most MOST.
 
-    on_nodes : each is moved to the nearest node of the junction.
+    on_nodes : whether each point is moved to the nearest node of the junction.
     """
 
     columns: Annotated[int, Field(ge=1, le=10_000)]
@@ -40,7 +40,15 @@ class Pattern(Table):
 
 
 class Positions(ContactEffect, ForceEffect):
-    """Forces at `points`, a list of (x, y) in mm; or `file`, a CSV with columns x and y; or a `pattern`."""
+    """Forces at points of the contact `between`, by default of all.
+
+    Parameters
+    ----------
+    points : sequence of (float, float)
+        x and y of each point, mm; or `file`, a CSV with these columns.
+    pattern : Pattern
+        Columns and rows of points, in place of `points`.
+    """
 
     columns: ClassVar[tuple[str, ...]] = ("x", "y")
     in_holes: ClassVar[bool] = True
@@ -54,7 +62,7 @@ class Positions(ContactEffect, ForceEffect):
         return self
 
     def marks(self, joint: AnyJoint) -> Matrix:
-        """(k, 2) coordinates in mm."""
+        """(k, 2) the points, mm."""
         if self.pattern is None:
             return np.array(self.points)
         low, high = joint.bounds

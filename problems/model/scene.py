@@ -21,7 +21,7 @@ E = TypeVar("E", bound=Effect)
 
 @dataclass(frozen=True)
 class PrintedOptimum:
-    """The objective ½xᵀKx − fᵀx at the solution, to so many digits, as a source prints it."""
+    """The objective ½xᵀKx − fᵀx at the solution as a source prints it, and the number of digits."""
 
     value: float
     digits: int
@@ -107,7 +107,7 @@ class JointScene(Scene):
 
     @cached_property
     def unusual(self) -> list[str]:
-        """A sentence on each parameter that may be, but is rarely meant."""
+        """A sentence on each parameter that is possible but rarely meant."""
         told = [("joint", self.joint.unusual())]
         told += [(effect.kind, effect.unusual(self.joint)) for effect in self.effects]
         return [
@@ -167,8 +167,8 @@ class ManufacturedProblem:
 class ManufacturedScene(Scene):
     """Matrices constructed in memory: a rung of a ladder without plates.
 
-    make : makes the same problem at every call, when it is needed. block_sizes : the unknowns of each block
-    of K. m : the contacts. sparse : whether K's blocks are.
+    make : makes the same problem at every call. block_sizes : the number of unknowns of each block of K.
+    m : the number of contacts. sparse : whether K's blocks are sparse.
     """
 
     make: Callable[[], ManufacturedProblem]
@@ -178,14 +178,14 @@ class ManufacturedScene(Scene):
 
     @classmethod
     def of(cls, title: str, problem: ManufacturedProblem, name: str = "", refused: str = "") -> Self:
-        """That of a problem which is there."""
+        """The scene of a problem that is already made."""
         K, m = problem.assembly.K, problem.assembly.m
         sizes = tuple(block.size for block in K.blocks)
         return cls(name, title, lambda: problem, sizes, m, not K.dense, refused=refused)
 
     @property
     def made(self) -> ManufacturedProblem:
-        """The problem; of several, only the last one stays in memory."""
+        """The problem; only the last one made stays in memory."""
         return _made(self.make)
 
     @cached_property
@@ -210,7 +210,7 @@ def _made(make: Callable[[], ManufacturedProblem]) -> ManufacturedProblem:
 
 
 def plain(table: Table) -> dict[str, Any]:
-    """The table as JSON, for keys. A pattern on nodes has the key that it had when all were."""
+    """The table as JSON, for keys. `on_nodes = true` is left out, so that published keys stay valid."""
     data = table.model_dump(mode="json")
     if (data.get("pattern") or {}).get("on_nodes"):
         del data["pattern"]["on_nodes"]

@@ -23,7 +23,10 @@ from .scene import JointScene
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """T (n, r) directions; k (r,) N/mm. parts : the unknowns of each, slices of x."""
+    """The springs of a scene: directions T (n, r) and stiffnesses k (r,), N/mm.
+
+    parts : the unknowns of each part, slices of x.
+    """
 
     T: sp.csc_array
     k: Vector
@@ -31,7 +34,7 @@ class Springs:
 
     @classmethod
     def of(cls, scene: JointScene) -> Springs:
-        """Of all effects of a scene; r may be 0."""
+        """The springs of all effects of a scene; there may be none."""
         joint = scene.joint
         found = [effect.springs(joint) for effect in scene.effects_of(SpringEffect)]
         T = [sp.csc_array((joint.size[0], 0)), *(T for T, _ in found)]
@@ -54,7 +57,7 @@ class Springs:
 
     @cached_property
     def ranges(self) -> list[list[int]]:
-        """The same as consecutive parts, in the order of x: from the first to the last that springs join."""
+        """The parts of each dense block: consecutive ones, from the first to the last that springs join."""
         ranges: list[list[int]] = []
         for parts in sorted(self.tied):
             if ranges and parts[0] <= ranges[-1][-1]:
@@ -64,14 +67,14 @@ class Springs:
         return ranges
 
     def key(self, key: str) -> str:
-        """That of K with springs, from the key of the parts' K."""
+        """The key of K with springs. key : of K without them."""
         T, k = self.T, self.k
         code = fingerprint([Path(__file__)])
         return storage.digest("springs", key, T.indices.tolist(), T.data.tolist(), k.tolist(), code)
 
     @cached_property
     def added(self) -> sp.csr_array:
-        """T diag(k) Tᵀ (n, n), symmetric to the last bit: the order of products is another in K_ji."""
+        """T diag(k) Tᵀ (n, n), made symmetric to the last bit: products round differently in K_ji."""
         product = self.T @ sp.diags_array(self.k) @ self.T.T
         return sp.csr_array((product + product.T) / 2)
 
@@ -80,8 +83,9 @@ class Springs:
         return slice(self.parts[group[0]].start, self.parts[group[-1]].stop)
 
     def blocks(self, key: str, parts: Sequence[Matrix], reporter: Reporter) -> tuple[list[Matrix], float]:
-        """The dense blocks of K with springs, one for each of `ranges`, from the cache or made now; and the
-        seconds that making them took. key : theirs. parts : K of each part.
+        """The dense blocks of K with springs, one for each of `ranges`, and the seconds that they took.
+
+        key : their key in the cache. parts : K of each part.
         """
 
         def made() -> storage.Entry:

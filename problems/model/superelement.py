@@ -1,11 +1,10 @@
 """One part as a superelement: its stiffness K on the unknowns that another program kept, and their nodes.
 
 K u = f with u the kept displacements and rotations, N and mm. A row of K is a degree of freedom of a node: 1,
-2, 3 displacements along x, y, z; 4, 5, 6 rotations about them. A file with labels (DMIG, Abaqus' text) says
-which; in others their order does (`superelement_rows`).
+2, 3 displacements along x, y, z; 4, 5, 6 rotations about them. Files with labels (DMIG, Abaqus' text) say
+which; in other files the order of the rows does (`superelement_rows`).
 
-A rigid motion r = t + ω × (p − p₀) of the nodes that K gives no force for, Kr = 0, is free: nothing holds the
-part against it but springs to other parts.
+A rigid motion of the nodes, r = t + ω × (p − p₀), is free if Kr = 0: only springs to other parts hold it.
 """
 
 from __future__ import annotations
@@ -138,7 +137,7 @@ class Superelement:
         return np.flatnonzero(self.nodes.contact)
 
     def displacements(self, direction: int) -> sp.csr_array:
-        """(contact nodes, n): picks the displacements along x, y or z (0, 1, 2); zero where none is kept."""
+        """(contact nodes, n) picks the displacements along x, y or z (0, 1, 2); 0 where K keeps none."""
         place = np.full(len(self.nodes.ids), -1)
         place[self.contacts] = np.arange(len(self.contacts))
         unknowns = np.flatnonzero((self.dof == direction + 1) & (place[self.node] >= 0))
@@ -170,7 +169,7 @@ class Superelement:
 
     @cached_property
     def free(self) -> Matrix:
-        """(n, r) an orthonormal basis of the rigid motions that K gives no force for."""
+        """(n, r) an orthonormal basis of the free rigid motions, Kr = 0."""
         U, s, _ = np.linalg.svd(self.rigid, full_matrices=False)
         K, Q = self.stiffness, U[:, s > 1e-9 * s[0]]
         _, V = np.linalg.eigh(Q.T @ (K @ Q))

@@ -1,14 +1,14 @@
-"""A joint of superelements: the plane of its junction, its contacts by projection, weights of points.
+"""A joint of superelements: the plane of its junction, its contacts by projection, the weights of points.
 
-The plane is that of x and y, if the mean normal of the first part is within 10° of z; else the plane across
-that normal, with x along the global axis x projected onto it (y, if the normal is nearly along x).
+The plane is the x-y plane if the mean normal of the first part is within 10° of z. Otherwise it is normal to
+that mean normal, and its x is the global x projected onto it (y, if the normal is nearly along x).
 
-A contact of the pair (a, b) is a contact node of a, at p with the normal n towards b, and its foot on b, at
-p + tn. With the weights w of b's nodes there, the parts do not overlap if
+A contact of the pair (a, b) is a contact node of a at p, with the normal n towards b, and its foot on b at
+p + tn. With the weights w of b's nodes at the foot, the parts do not overlap if
 
     n·u_a − Σ w_j n·u_b,j ≤ g.
 
-t is not part of the gap g, which comes from the effects.
+The distance t is not part of the gap g, which comes from the effects.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ PER_LENGTH, FEWEST, MOST = 6, 4, 1000  # lines of a grid for random fields: per 
 
 
 class PairingTable(Table):
-    """distance : how far from each other along the normal two surfaces may be, mm."""
+    """[joint.pairing]. distance : the largest distance, mm, of a node from its foot on the other part."""
 
     distance: Annotated[Positive, "mm"] = 5.0
 
 
 class SuperelementJointTable(Table):
-    """[joint] of parts that are superelements."""
+    """The table [joint] of a joint whose parts are superelements."""
 
     pairing: PairingTable = PairingTable()
     part: Annotated[tuple[SuperelementTable, ...], Field(min_length=1, max_length=100)]
@@ -57,7 +57,7 @@ class SuperelementJointTable(Table):
 
 @dataclass(frozen=True, eq=False)
 class SuperelementJoint:
-    """x are the kept unknowns of all parts, part after part. See `interface.AnyJoint`."""
+    """A joint of superelements; x are the kept unknowns of all parts, part after part. See `AnyJoint`."""
 
     parts: tuple[Superelement, ...]
     distance: float
@@ -65,7 +65,7 @@ class SuperelementJoint:
 
     @classmethod
     def of(cls, folder: Path, table: SuperelementJointTable) -> SuperelementJoint:
-        """Raises InputError with all faults of all files."""
+        """Read the parts. Raises InputError with all faults of all files."""
         parts, faults = [], []
         for part in table.part:
             try:
@@ -77,7 +77,7 @@ class SuperelementJoint:
         return cls(tuple(parts), table.pairing.distance, table.contacts)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what is made from the files: a copy for another process makes it there."""
+        """The data for a copy in another process, which computes the cached properties anew."""
         return {name: getattr(self, name) for name in ("parts", "distance", "contacts")}
 
     def with_contacts(self, pairs: tuple[Pair, ...]) -> SuperelementJoint:
@@ -115,7 +115,7 @@ class SuperelementJoint:
 
     @cached_property
     def _normals(self) -> dict[str, Matrix]:
-        """(c, 3) of the contact nodes of each part, along the global axes."""
+        """The normals (c, 3) of the contact nodes of each part, in the global axes."""
         return {part.name: part.nodes.normal[part.contacts] for part in self.parts}
 
     @cached_property
@@ -124,7 +124,7 @@ class SuperelementJoint:
 
     @cached_property
     def faces(self) -> dict[str, Face]:
-        """In the axes of the plane. Raises ValueError if the nodes of a part are on one line."""
+        """The face of each part in the axes of the plane. Raises ValueError if its nodes are on one line."""
         faces = {}
         for part in self.parts:
             xyz, normals = (each[part.contacts] @ self.axes.T for each in (part.nodes.xyz, part.nodes.normal))
@@ -141,7 +141,7 @@ class SuperelementJoint:
         return {pair: of(*pair) for pair in self.pairs}
 
     def faults(self) -> Faults:
-        """Of the contacts; of files they are raised when these are read."""
+        """Yield the faults of the contacts; faults of files are raised when these are read."""
         wrong = list(wrong_contacts(self.names, self.contacts, self.pairs, at_one_place=False))
         for part in self.parts:
             steep = part.nodes.normal[part.contacts] @ self.axes[2] < STEEP
@@ -252,7 +252,7 @@ class SuperelementJoint:
         return inside
 
     def _along(self, part: str, W: sp.csr_array, normals: Matrix) -> sp.csr_array:
-        """(k, unknowns of the part): Σ_j w_ij n_i·u_j, of weights W (k, contact nodes), normals (k, 3)."""
+        """(k, unknowns of the part) of Σ_j w_ij n_i·u_j. W (k, contact nodes) : w. normals (k, 3) : n."""
         own = self._of[part]
         terms = [sp.diags_array(normals[:, d]) @ W @ own.displacements(d) for d in range(3)]
         found = sp.csr_array(terms[0] + terms[1] + terms[2])
@@ -287,7 +287,7 @@ class SuperelementJoint:
         return lines(low[0], high[0]), lines(low[1], high[1])
 
     def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
-        """By the cubic splines of `from_grid`."""
+        """The weights of the cubic splines of `from_grid`."""
         from scipy.interpolate import make_interp_spline
 
         lines = self.grid(correlation_length)

@@ -2,9 +2,9 @@
 
     min ½xᵀKx − fᵀx   subject to   Aᵀx ≤ g,    K = blockdiag(K_1, …, K_p) + T diag(k) Tᵀ
 
-x are all unknowns that the parts kept; nothing is condensed. T, k are springs, of installed fasteners. They
-must hold the free rigid motions of the parts, K_i r = 0: with N a basis of these, NᵀT diag(k) TᵀN is positive
-definite.
+x are all unknowns that the parts kept; nothing is condensed. T and k are the springs of installed fasteners.
+They must hold the free rigid motions of the parts, K_i r = 0: with N a basis of these, NᵀT diag(k) TᵀN is
+positive definite.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ HELD = 1e-9  # of the stiffest motion that springs hold: a softer one is not hel
 
 @dataclass(frozen=True)
 class SuperelementModel:
-    """As JointModel."""
+    """The matrices of a joint of superelements, with the methods of JointModel."""
 
     scene: JointScene
     joint: SuperelementJoint
 
     @classmethod
     def of(cls, scene: JointScene) -> SuperelementModel:
-        """Raises InputError if parts are free, or if contacts depend on one another."""
+        """The model of a scene. Raises InputError if parts are free, or if contacts depend on one another."""
         assert isinstance(scene.joint, SuperelementJoint)
         model = cls(scene, scene.joint)
         model._refuse_free()
@@ -69,7 +69,7 @@ class SuperelementModel:
         return bool(large) and all(large)
 
     def sparse(self) -> SparsePrepared:
-        """Raises InputError also if a K is dense."""
+        """K and A as sparse matrices. Raises InputError if a large K is dense."""
         start = time.perf_counter()
         for part in self.joint.parts:
             if part.size > SMALL and not part.sparse:

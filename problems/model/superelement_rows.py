@@ -1,7 +1,8 @@
-"""Which node and which degree of freedom the rows of a part's K are: by the file's labels, or by their order.
+"""The node and the degree of freedom of each row of a part's K, from the file's labels or the order of rows.
 
-The order of rows shows in K: those that a row is coupled to most, by |K_ij| / √(K_ii K_jj), are near it. Its
-median rank is that of these nodes among all nodes by their distance from the row's own.
+A wrong order shows in K. The rows with the largest |K_ij| / √(K_ii K_jj) belong to nodes near that of row i.
+The rank of such a node is its place among all nodes sorted by their distance from that of row i; the median
+rank over a sample of rows is small if the order is right.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from .node_table import Nodes, listed
 Order = Literal["table", "ids", "directions"]
 Rows = tuple[Indices, Indices]
 NORMAL_ALONE = (3,)  # dofs, if neither the file of K nor the scene says them
-FIRST = 7  # rows that are printed
-SAMPLE, STRONGEST = 64, 4  # rows that are looked at; nodes that each is coupled to most
+FIRST = 7  # rows printed by validate
+SAMPLE, STRONGEST = 64, 4  # rows examined; nodes of the largest coupling per row
 BETTER, FAR = 3.0, 10  # times the rank of another order; the rank of nodes at random is half their number
 NAMES = ("x", "y", "z", "about x", "about y", "about z")
 
 
 def by_order(order: Order, nodes: Nodes, dofs: tuple[int, ...]) -> Rows:
-    """The node and degree of freedom of each row. dofs : of each node."""
+    """The node and degree of freedom of each row in that order. dofs : those of each node."""
     count, every = len(nodes.ids), np.array(dofs)
     if order == "directions":
         return np.tile(nodes.table, len(dofs)), np.repeat(every, count)
@@ -93,7 +94,7 @@ def first_rows(nodes: Nodes, rows: Rows) -> str:
 
 
 def misfit(K: Any, nodes: Nodes, rows: Rows, dofs: tuple[int, ...]) -> tuple[float, str] | None:
-    """The median rank of rows (node, dof) of K, and what is usual; None if they fit."""
+    """The median rank, and what is usual, if rows (node, dof) do not fit K; None if they fit."""
     here = _rank(K, nodes, rows[0])
     if len(nodes.ids) * len(dofs) == len(rows[0]):
         ranks = {order: _rank(K, nodes, by_order(order, nodes, dofs)[0]) for order in get_args(Order)}

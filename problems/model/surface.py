@@ -3,11 +3,12 @@
 Points and nodes are in a plane, mm. With the weights W of points, Wv are the values there of a field with the
 values v at the nodes, and Wᵀp are nodal forces with the resultant and the moments of forces p at the points.
 
-    a grid      bilinear on its rectangles; areas by the trapezoidal rule
-    triangles   Wachspress' on the cells of `cells`: barycentric on triangles, bilinear on rectangles
+    Grid        bilinear on its rectangles; areas by the trapezoidal rule
+    Triangles   Wachspress' weights on `cells_of` nodes: barycentric in triangles, bilinear in rectangles
 
-The triangles between the edges of a cell and the mean of its corners give a third of their area to each of
-their corners, and that of the mean to all corners of the cell alike. Bays and holes are no surface.
+Areas of triangles: a cell is divided into triangles between its edges and the mean of its corners. Each gives
+a third of its area to both ends of its edge; the last third is shared by all corners of the cell. Bays and
+holes are not part of the surface.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ ROUNDING = 1e-9  # of a triangle's size, by which a point on its border may be o
 
 
 class Surface(ABC):
-    """triangles : (t, 3) nodes, all of one orientation."""
+    """A surface through nodes. triangles : (t, 3) its nodes, all of one orientation."""
 
     triangles: Indices
 
@@ -52,7 +53,8 @@ class Grid(Surface):
     """The rectangles between the lines x and y, after a turn of the plane.
 
     place : the number of the node at each crossing, x running fastest; by default 0, 1, 2, …
-    same : mm, by which a point may miss a line, or the surface. turn (2, 2) : of points, (k, 2) @ turn.
+    same : the distance, mm, by which a point may miss a line or the surface. turn (2, 2) : the rotation of
+    points (k, 2), as points @ turn.
     """
 
     x: Vector
@@ -102,11 +104,12 @@ class Grid(Surface):
 
 @dataclass(frozen=True, eq=False)
 class Triangles(Surface):
-    """The cells between nodes (c, 2): to the last bit the same, whatever the order of the nodes.
+    """The cells between nodes (c, 2); the order of the nodes does not change a bit.
 
-    order : the nodes by x, then y. nodes, mesh (Delaunay's), tree : of these, about their middle.
-    cell, kept (t,) : the cell of each triangle of the mesh, and whether it is of the surface.
-    start, corner : corner[start[k]:start[k + 1]] are those of cell k, anticlockwise.
+    order : the nodes sorted by x, then y. middle : their mean.
+    nodes, mesh, tree : the sorted nodes about their mean, their Delaunay triangulation and search tree.
+    cell, kept (t,) : the cell of each triangle of the mesh, and whether it belongs to the surface.
+    start, corner : corner[start[k]:start[k + 1]] are the corners of cell k, anticlockwise.
     """
 
     order: Indices
@@ -121,7 +124,7 @@ class Triangles(Surface):
 
     @classmethod
     def of(cls, nodes: Matrix, holes: bool = True) -> Triangles:
-        """holes : whether to leave out bays and holes. No two nodes may be closer than `SAME`."""
+        """The surface of nodes that are SAME or more apart. holes : whether bays and holes stay open."""
         from scipy.spatial import Delaunay, cKDTree
 
         order = np.lexsort(nodes.T[::-1])
@@ -185,7 +188,7 @@ class Triangles(Surface):
         return found
 
     def _owners(self, points: Matrix) -> Indices:
-        """A triangle of the surface of each point, −1 off it; of several that touch it, the first."""
+        """The triangle under each point, −1 off the surface; the first one for a point on a border."""
         owner = self.mesh.find_simplex(points, tol=ROUNDING)
         best = np.full(len(points), len(self.cell))
         for triangle in np.column_stack([owner, self.mesh.neighbors[owner]]).T:
@@ -201,7 +204,7 @@ class Triangles(Surface):
 
 
 def surface_of(nodes: Matrix) -> Surface:
-    """A grid if the nodes (c, 2) are a full one, however it lies, else triangles.
+    """The surface of nodes (c, 2): a Grid if they form a full grid, turned or not, else Triangles.
 
     Raises ValueError if they are on a line.
     """
@@ -221,7 +224,7 @@ def surface_of(nodes: Matrix) -> Surface:
 
 
 def _shortest_edge(nodes: Matrix) -> Vector:
-    """The direction from some node to the nearest other one: that of the lines, if the nodes are a grid."""
+    """The direction from the first node to its nearest neighbour, which is that of the lines of a grid."""
     away = nodes - nodes[0]
     distance = np.linalg.norm(away, axis=1)
     distance[0] = np.inf
@@ -230,7 +233,7 @@ def _shortest_edge(nodes: Matrix) -> Vector:
 
 
 def _lines(values: Vector) -> tuple[Vector, Indices]:
-    """The distinct values, apart from rounding, and the number of each one's."""
+    """The distinct values, apart from rounding, and the index among them of each value."""
     order = np.argsort(values, kind="stable")
     new = np.diff(values[order], prepend=-np.inf) > SAME
     number = np.empty(len(values), dtype=np.intp)
@@ -239,9 +242,7 @@ def _lines(values: Vector) -> tuple[Vector, Indices]:
 
 
 def _within(grid: Vector, at: Vector, same: float) -> tuple[Indices, Vector]:
-    """The element in which each point lies, and how far along it, 0 … 1, to 12 digits: what was meant to be
-    at a node is there.
-    """
+    """The element of each point, and its place in it, 0 … 1, rounded to 12 digits so that nodes are exact."""
     if same:
         nearest = grid[np.searchsorted((grid[1:] + grid[:-1]) / 2, at)]
         at = np.where(abs(at - nearest) <= same, nearest, at)

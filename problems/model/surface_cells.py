@@ -1,13 +1,14 @@
 """The cells between scattered nodes: Delaunay's polygons, and which of them bridge a hole or a bay.
 
-A cell has as corners all nodes on one empty circle: three as a rule, four in a grid. The diagonals that
-Delaunay's triangulation chooses freely in a cell change nothing here.
+The corners of a cell are all nodes on one empty circle: three as a rule, four in a grid. Delaunay's
+triangulation divides a cell by diagonals of its choice, which have no influence here.
 
 An edge opposite to an angle of 90° or more does not join neighbours, as the centre of the triangle's circle
 lies beyond it. The cells on both sides of such an edge belong to one pocket. A pocket is a hole if its
 largest circle is wider than 2.5 times the usual distance of neighbours at any of its nodes, or than 2.25
-times the longest edge around it: a missing node of a mesh makes that 2, a round hole of eight nodes 2.6. In a
-pocket that opens to the outside, a cell is part of a bay if its longest edge is longer than the former.
+times the longest edge around it. (A missing node of a mesh gives a ratio of 2, a round hole of eight nodes
+2.6.) In a pocket that opens to the outside, a cell is part of a bay if its longest edge exceeds the first of
+these limits.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ BRIDGE, HOLE = 2.5, 2.25  # times the usual distance of neighbours; times the lo
 
 
 def cells_of(nodes: Matrix, triangles: Indices, beside: Indices) -> tuple[Indices, Mask, Mask]:
-    """The cell of each triangle, 0, 1, …; which triangles have an area; which are in a bay or a hole.
+    """The cell of each triangle, whether the triangle has an area, and whether it is in a bay or a hole.
 
-    triangles (t, 3); beside (t, 3) the triangle across from each corner, −1 outside.
+    triangles (t, 3) : their nodes. beside (t, 3) : the triangle across from each corner, −1 outside.
     """
     corners = nodes[triangles]
     first, second = np.roll(triangles, -1, axis=1), np.roll(triangles, 1, axis=1)
@@ -60,7 +61,7 @@ def cells_of(nodes: Matrix, triangles: Indices, beside: Indices) -> tuple[Indice
 
 
 def _joined(first: Indices, second: Indices, count: int) -> Indices:
-    """(count,) the component of each triangle, where first and second belong together."""
+    """(count,) the connected component of each triangle; first[k] and second[k] are connected."""
     links = sp.coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.intp)
 
@@ -95,8 +96,8 @@ def means(label: Indices, values: Matrix | Vector) -> Any:
 def wachspress(corners: Matrix, points: Matrix) -> Matrix:
     """(k, n) weights of the corners (k, n, 2) of convex polygons at points (k, 2) in them, to 12 digits.
 
-    w_i is the area of the corner i and its neighbours, times those that the point spans with all edges but
-    the two that meet there.
+    w_i is the area of the triangle of corner i and its neighbours, times the areas of the triangles between
+    the point and each edge that does not meet corner i.
     """
     previous, after = np.roll(corners, 1, axis=1), np.roll(corners, -1, axis=1)
     at = points[:, None]
