@@ -1,4 +1,4 @@
-"""A child process: its side of a monitored call (monitored_call.py), and how what it has started is ended.
+"""The child's side of a monitored call (monitored_call.py), and how the processes that it started are ended.
 
 The call comes pickled through stdin; events go back as JSON lines on the file descriptor that it names.
 """
@@ -25,7 +25,7 @@ TIMEOUT_S = 10.0  # for children that keep forking
 
 
 class Events:
-    """What goes back to the driver, from this process alone: a fork that returns here ends."""
+    """Sends events to the driver, from this process alone: a fork of it that returns here ends."""
 
     def __init__(self, descriptor: int) -> None:
         self.descriptor = descriptor
@@ -42,8 +42,9 @@ class Events:
 
 
 def main() -> None:
-    """Call the function; report what it returns, or its exception with a status; then wait to be killed, so
-    that what is registered for the exit never runs.
+    """Call the function; report its result, or its exception with a status; then wait to be killed.
+
+    Functions registered for the exit of the process therefore never run.
     """
     die_with_driver()
     faulthandler.enable()
@@ -74,18 +75,18 @@ def die_with_driver() -> None:
         prctl(set_child_subreaper, 1)
 
 
-def end_children(pid: int) -> None:
+def end_children(parent: int) -> None:
     """Kill the children of a stopped process until none is left.
 
     Their orphans become its children too, since it is a subreaper.
     """
     deadline = time.monotonic() + TIMEOUT_S
-    ended: set[int] = set()  # the process does not reap them, so none of their numbers is given again
-    while (left := [child for child in _children(pid) if child not in ended]) and time.monotonic() < deadline:
-        for child in reversed(left):  # the youngest first, before its parent forks another
+    ended: set[int] = set()  # the stopped process does not reap them, so none of their numbers is used again
+    while (alive := [pid for pid in _children(parent) if pid not in ended]) and time.monotonic() < deadline:
+        for child in reversed(alive):  # the youngest first, before its parent forks another
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(child, signal.SIGKILL)
-        ended |= {child for child in left if not _is_alive(child)}  # whose orphans the next list has
+        ended |= {child for child in alive if not _is_alive(child)}  # their orphans are in the next list
 
 
 def _children(pid: int) -> list[int]:

@@ -1,7 +1,7 @@
 """Environments with other versions of a library than this one has, as `run --with piqp==0.6.2` asks for.
 
-Each is a virtual environment in the cache, made by venv and pip. Behind its own packages it sees those of
-this interpreter, so that it differs in what was asked for and what that pulls in, and in nothing else.
+Each is a virtual environment in the cache, made by venv and pip, whose path ends with this interpreter's
+site-packages: only the requested package and its dependencies are new.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from problems import storage
 from problems.errors import InputError
 from problems.reporter import SILENT, Reporter
 
-#: Read after the .pth files of packages, whose folders come before those it adds.
+#: The file that adds this interpreter's folders. Its name sorts last, so that the folders of the other .pth
+#: files come first.
 PARENT = "zzz-parent.pth"
-#: Where packages made by cmeel are, such as proxsuite. The .pth of cmeel adds only the folder beside cmeel.
+#: The folder of packages made by cmeel, such as proxsuite; the .pth of cmeel is read only beside cmeel.
 CMEEL = "cmeel.prefix/lib/python{}.{}/site-packages".format(*sys.version_info)
 COMPLETE = "complete"
 LAST_LINES = 5  # of what pip prints
@@ -49,13 +50,13 @@ def interpreter(requirements: Sequence[str], reporter: Reporter = SILENT) -> str
 
 
 def _make(folder: Path, python: Path, requirements: Sequence[str]) -> None:
-    known = ["--without-pip"] if importlib.util.find_spec("pip") else []  # it sees that of this interpreter
-    _called([sys.executable, "-m", "venv", *known, str(folder)], requirements)
-    own = sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)})
+    without = ["--without-pip"] if importlib.util.find_spec("pip") else []  # it sees this interpreter's pip
+    _called([sys.executable, "-m", "venv", *without, str(folder)], requirements)
+    packages = sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)})
     lines = [f"import site; site.addsitedir({folder!r})" for folder in _packages()]
-    (Path(own) / PARENT).write_text("\n".join([CMEEL, *lines, ""]), "utf-8")
+    (Path(packages) / PARENT).write_text("\n".join([CMEEL, *lines, ""]), "utf-8")
     pip = [str(python), "-I", "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
-    # First what is asked for, even if this interpreter has it; then what that needs and nobody has.
+    # First the requested packages, even if this interpreter has them; then the dependencies that are missing.
     for more in (["--ignore-installed", "--no-deps"], []):
         _called([*pip, *more, *requirements], requirements)
 
@@ -66,14 +67,15 @@ def _packages() -> list[str]:
 
 
 def refuse_other_copies(requirements: Sequence[str]) -> None:
-    """In an environment: raise InputError if a package was imported from elsewhere, as by PYTHONPATH."""
+    """Raise InputError if a package was imported from elsewhere than the environment, as by PYTHONPATH."""
     imported = [str(getattr(module, "__file__", None)) for module in sys.modules.values()]
     for requirement in requirements:
         library, _, version = requirement.partition("==")
         installed = distribution(library)
         for file in installed.files or ():
-            own = str(installed.locate_file(file))
-            if other := next((each for each in imported if each.endswith(f"/{file}") and each != own), None):
+            expected = str(installed.locate_file(file))
+            others = (path for path in imported if path.endswith(f"/{file}") and path != expected)
+            if other := next(others, None):
                 raise InputError.one("--with", library, version, f"another copy is imported: {other}")
 
 

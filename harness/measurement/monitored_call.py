@@ -1,4 +1,4 @@
-"""A function called in a process of its own, watched from outside: its time, its memory, its end.
+"""Calls a function in a process of its own, and watches its time, its memory and its end from outside.
 
 Whatever the process does (hang, crash, exhaust memory, fork, print without end), its end is an event, and
 none of its processes survives.
@@ -47,8 +47,8 @@ def environment(threads: int) -> dict[str, str]:
     if str(ROOT) not in (*site.getsitepackages(), site.getusersitepackages()):
         paths.insert(0, str(ROOT))
     count = dict.fromkeys(THREAD_VARIABLES, str(threads))
-    mine = {name: value for name, value in os.environ.items() if name != TRIM}
-    return {**mine, **count, "OMP_DYNAMIC": "FALSE", "PYTHONPATH": os.pathsep.join(paths)}
+    inherited = {name: value for name, value in os.environ.items() if name != TRIM}
+    return {**inherited, **count, "OMP_DYNAMIC": "FALSE", "PYTHONPATH": os.pathsep.join(paths)}
 
 
 class Monitored:
@@ -56,7 +56,7 @@ class Monitored:
 
     Parameters
     ----------
-    function : of a module; called there (child.py) with `job` and an `Events` to report to.
+    function : of a module; called in the child (child_process.py) with `job` and an `Events`.
     job : anything that can be pickled. threads : for linear algebra.
     phases : the limit on each phase, s; an event with `phase` starts the next one, of `times` that limit.
     python : the interpreter (environments.py).
@@ -111,8 +111,10 @@ class Monitored:
         self.end()
 
     def __iter__(self) -> Iterator[Row]:
-        """Its events, and an empty one where none comes for a while. The last one has `ended`: it is what the
-        function returned, or has a `status` and a `message` that say why it did not return.
+        """Its events, and an empty one where none comes for a while.
+
+        The last one has `ended`: it is the function's result, or has a `status` and a `message` that say why
+        the function did not return.
         """
         while True:
             dead = self.process.poll() is not None
@@ -129,7 +131,7 @@ class Monitored:
                     return
 
     def _listen(self, seconds: float) -> None:
-        """Receive what it reports, for at most `seconds`."""
+        """Receive its events and its stderr, for at most `seconds`."""
         for key, _ in self.selector.select(seconds):
             chunk = os.read(key.fd, CHUNK)
             if chunk:

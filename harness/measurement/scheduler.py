@@ -1,4 +1,4 @@
-"""Work on Dask workers: `local:N`, or the address of a scheduler. Dask is imported only if they are used.
+"""Does tasks on Dask workers: `local:N`, or those of a scheduler. Dask is imported only if they are used.
 
 Each worker takes one task at a time, so that a measurement has its worker to itself. The tasks of a lost
 worker are done by others; a task that keeps killing workers fails alone. Only the driver writes results.
@@ -21,6 +21,7 @@ from harness.measurement.monitored_call import TRIM
 from harness.results.provenance import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
 from problems.storage import ROOT, fingerprint
+from report.document.numbers import counted
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -35,7 +36,7 @@ ENVIRONMENT = "distributed.nanny.pre-spawn-environ"  # of a local worker
 
 @contextmanager
 def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
-    """An executor on the workers and how many there are, which is also told.
+    """An executor on the workers, and their number.
 
     Raises InputError if Dask is not installed, the scheduler does not answer or has no worker, or a worker
     has more than one thread or other versions than this process.
@@ -72,20 +73,20 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Processes that begin here ignore Ctrl-C, and say nothing of it: the one that began them ends them."""
+    """Processes that begin within ignore Ctrl-C: this process ends them."""
     if threading.current_thread() is not threading.main_thread():  # only that one can
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, handler)
 
 
 @contextmanager
 def _silent_if_interrupted(client: Any) -> Iterator[None]:
-    """Dask logs each task that an interrupt cuts off, its workers failing heartbeats: not after one."""
+    """Silence Dask after an interrupt: it would log each task that was cut off."""
     try:
         yield
     except KeyboardInterrupt:
@@ -123,7 +124,7 @@ def _connected(client: Any, scheduler: str, console: Console) -> tuple[Executor,
     faults += _other_versions(client)
     if faults:
         raise InputError(faults)
-    console.print(f"{len(threads)} workers at {scheduler}")
+    console.print(f"{counted(len(threads), 'worker')} at {scheduler}")
     return client.get_executor(pure=False, retries=RETRIES), len(threads)
 
 
@@ -131,13 +132,13 @@ def _other_versions(client: Any) -> list[Fault]:
     """A fault for each package that a worker has in another version. Raises InputError if one lacks these."""
     here = versions()
     try:
-        found = client.run(versions)
+        of_workers = client.run(versions)
     except Exception as error:  # an import failed there
         allowed = "install rivetbench for the scheduler and its workers, or start them with PYTHONPATH"
         raise InputError.one("--scheduler", "import", str(error), allowed) from error
     return [
         Fault(f"worker {address}", name, there.get(name), f"the driver has {version}: install the same")
-        for address, there in found.items()
+        for address, there in of_workers.items()
         for name, version in here.items()
         if there.get(name) != version
     ]
@@ -153,9 +154,9 @@ def versions() -> dict[str, str]:
 def done_as_completed(
     executor: Executor, count: int, work: Callable[[S], R], tasks: Iterable[tuple[T, S]]
 ) -> Iterator[tuple[T, R | BaseException]]:
-    """Each task with its result, or with what it raised, as they end; only a few are submitted at a time.
+    """Each task with its result, or with its exception, as they end; only a few are submitted at a time.
 
-    tasks : pairs of what identifies a task here and the argument of `work`.
+    tasks : pairs of an object that stays here, to identify the task, and the argument of `work`.
     """
     remaining = iter(tasks)
     running: dict[Future[R], T] = {}

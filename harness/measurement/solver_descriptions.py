@@ -1,8 +1,7 @@
-"""The forms, versions, code and faulty options of a suite's solvers; which rows of an earlier run still hold.
+"""The forms, versions and code of a suite's solvers, and the rows of an earlier run that they still hold for.
 
-Libraries and plug-ins are asked in a process of their own: one that prints, crashes or hangs while it is
-imported then does no harm, and the driver imports none. The project's own methods are asked here. A row holds
-for the same scene, solver, code and accuracy.
+Libraries and plug-ins are imported in a process of their own, so that one that prints, crashes or hangs does
+no harm; the project's own methods are imported here. A row holds for the same scene, solver, code and accuracy.
 """
 
 from __future__ import annotations
@@ -27,6 +26,7 @@ from problems.forms import FORMS, default_form
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from problems.storage import ROOT, fingerprint
+from report.document.numbers import counted
 from solvers.base import Form, Solver
 from solvers.plugin import plugin_files
 from solvers.registry import make_solver, owner_of, solver_version
@@ -41,10 +41,10 @@ IMPORT_MIB = 8192
 
 @dataclass(frozen=True)
 class Description:
-    """What rows say of a solver: its forms, the version of its library, a hash of this project's code for it,
-    and its owner (`solvers.registry.owner_of`).
+    """The facts of a solver for its rows.
 
-    failure : why the version asked for cannot be used, "" if it can.
+    version : of its library. code : a hash of this project's code for it. owner : one of schema.OWNERS.
+    failure : why the requested version cannot be used, "" if it can.
     """
 
     forms: list[Form]
@@ -60,6 +60,8 @@ class Description:
 
 #: By name and label.
 Solvers = dict[tuple[str, str], Description]
+#: A solver's name and options.
+Named = tuple[str, dict[str, Any]]
 
 
 def describe(suite: Suite, reporter: Reporter = SILENT) -> list[Description]:
@@ -70,42 +72,42 @@ def describe(suite: Suite, reporter: Reporter = SILENT) -> list[Description]:
 
 
 def _of_version(entry: SolverEntry, plugin: str | None, reporter: Reporter) -> Description:
-    """A description in the entry's own environment; one that says so if it cannot be had there."""
+    """A description in the entry's own environment; one with a `failure` if that cannot be made."""
     solver, requirements = (entry.name, entry.options), entry.requirements or []
     try:
-        (found,) = described([solver], plugin, "--with", reporter, requirements)
+        (description,) = described([solver], plugin, "--with", reporter, requirements)
     except InputError as error:
         return Description(entry.forms or list(FORMS), entry.version, code="", failure=str(error))
-    return replace(found, version=entry.version)
+    return replace(description, version=entry.version)
 
 
 def described(
-    solvers: Sequence[tuple[str, dict[str, Any]]],
+    solvers: Sequence[Named],
     plugin: str | Path | None,
     where: str,
     reporter: Reporter = SILENT,
     requirements: Sequence[str] = (),
 ) -> list[Description]:
-    """A description of each solver, given by name and options. Raises InputError, all faults at once.
+    """A description of each solver. Raises InputError, all faults at once.
 
-    where : what names them. requirements : what the environment has in other versions than this one.
+    where : the place that names them. requirements : packages of their environment, NAME==VERSION.
     """
     if not requirements and all(owner_of(name) != "library" for name, _ in solvers):
-        return found_here(solvers, None)
+        return described_here(solvers, None)
     name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None, requirements)
     python = interpreter(requirements, reporter)
     limits = {"importing the solvers": IMPORT_S}
-    monitored = Monitored(describe_here, job, 1, limits, IMPORT_MIB, python)
+    monitored = Monitored(described_in_child, job, 1, limits, IMPORT_MIB, python)
     with reporter.step("importing"), monitored as process:
         for event in process:
             name = event.get("name", name)
             reporter.progress(name)
         refuse_unimportable(event, process, plugin or where, name)
-    return [Description(**found) for found in event["found"]]
+    return [Description(**fields) for fields in event["descriptions"]]
 
 
 def refuse_unimportable(end: Row, process: Monitored, where: str | Path, name: str) -> None:
-    """Raise InputError unless the process came to its end."""
+    """Raise InputError if the last event of an import is a failure."""
     if faults := end.get("faults"):
         raise InputError([Fault(**fault) for fault in faults])
     if "status" in end:
@@ -113,23 +115,21 @@ def refuse_unimportable(end: Row, process: Monitored, where: str | Path, name: s
         raise InputError.one(where, "solver", name, " ".join([f"importing it: {end['message']}", *last]))
 
 
-def describe_here(
-    job: tuple[list[tuple[str, dict[str, Any]]], Path | None, Sequence[str]], events: Events
-) -> Row:
-    """The same, in the process of its own."""
+def described_in_child(job: tuple[list[Named], Path | None, Sequence[str]], events: Events) -> Row:
+    """The descriptions, made in a child process, which reports each name first."""
     solvers, plugin, requirements = job
-    found = found_here(solvers, plugin, lambda name: events.report(name=name))
+    descriptions = described_here(solvers, plugin, lambda name: events.report(name=name))
     refuse_other_copies(requirements)
-    return {"found": [asdict(each) for each in found]}
+    return {"descriptions": [asdict(each) for each in descriptions]}
 
 
-def found_here(
-    solvers: Sequence[tuple[str, dict[str, Any]]],
+def described_here(
+    solvers: Sequence[Named],
     plugin: Path | None,
     begin: Callable[[str], None] = lambda name: None,
 ) -> list[Description]:
     """The descriptions, made in this process. Raises InputError, all faults at once."""
-    found: list[Description] = []
+    descriptions: list[Description] = []
     faults: list[Fault] = []
     for name, options in solvers:
         begin(name)
@@ -137,16 +137,15 @@ def found_here(
             solver = make_solver(name, options, plugin)
             forms = solver.forms
             if not isinstance(forms, tuple | list) or not forms or not all(form in FORMS for form in forms):
-                raise InputError.one(
-                    f"solver {name}", "forms", shown(forms), f"a tuple of {', '.join(FORMS)}"
-                )
+                allowed = f"a tuple of {', '.join(FORMS)}"
+                raise InputError.one(f"solver {name}", "forms", shown(forms), allowed)
             version, code = solver_version(name, plugin), code_of(solver)
-            found.append(Description(list(forms), version, code, owner_of(name)))
+            descriptions.append(Description(list(forms), version, code, owner_of(name)))
         except InputError as error:
             faults += error.faults
     if faults:
         raise InputError(faults)
-    return found
+    return descriptions
 
 
 def code_of(solver: Solver) -> str:
@@ -167,7 +166,7 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
     """The valid rows of DIRECTORY; outdated ones are moved to a file of their own."""
     path = directory / records.MEASUREMENTS
     if records.remove_torn_line(path):
-        console.print(f"{path}: the last line was torn, and is measured again", style="yellow")
+        console.print(f"{path}: the last line was cut off, and is measured again.", style="yellow")
     rows = records.read(path)
     refuse_wrong_kinds(path, rows, needed=NEEDED)
     planned = {m.key: m for m in plan}
@@ -183,19 +182,25 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
         records.append(directory / records.OUTDATED, *(row | {"answer": None} for row in old))
         rows = [row for row in rows if row not in old]
         records.rewrite(path, rows)
-        why = "the scene, the solver or the limits have changed since"
-        console.print(f"{len(old)} rows are set aside in {records.OUTDATED}: {why}", style="yellow")
+        aside = f"Set aside in {records.OUTDATED}, to be measured again: {counted(len(old), 'row')}"
+        why = "because the scene, the solver or the limits have changed since"
+        console.print(f"{aside}, {why}.", style="yellow")
     return rows
 
 
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
     """Whether a row is of another scene, series, solver or accuracy, or hit a limit that is wider now."""
+    current = {
+        "scene_key": scene_key,
+        "solver_version": solver.version,
+        "solver_code": solver.code,
+        "limit_asked_mm": m.suite.limit_mm,
+        "gated": m.entry.gated,
+    }
     law = m.series.model_dump(exclude={"cases"}) if m.series else {}
-    now = (scene_key, solver.version, solver.code, m.suite.limit_mm, m.entry.gated, law)
-    drawn = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
-    solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
-    before = (*solved, row.get("limit_asked_mm"), row.get("gated"), drawn)
+    recorded_law = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
+    changed = law != recorded_law or any(row.get(name) != value for name, value in current.items())
     out_of_time = row["status"] in OUT_OF_TIME and row["time_limit_s"] < m.time_limit_s
-    left_behind = m.suite.stop_at_times_fastest is not None and bool(row.get("stop"))
+    stopped = m.suite.stop_at_times_fastest is not None and bool(row.get("stop"))
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.suite.memory_limit_mib
-    return now != before or (out_of_time and not left_behind) or out_of_memory
+    return changed or (out_of_time and not stopped) or out_of_memory

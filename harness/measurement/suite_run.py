@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -31,6 +31,7 @@ from harness.verification.reference_problem import (
 from problems.forms import form_family
 from problems.forms.problem import in_form
 from problems.scene_files import read_scene
+from report.document.numbers import counted
 
 from .scheduler import done_as_completed, workers
 from .solver_descriptions import Description, Solvers, describe, resumed
@@ -40,12 +41,11 @@ from .task import Task, TaskResult, rows_of, run_task, run_task_on_worker
 def run(
     suite: Suite, directory: Path, console: Console, scheduler: str | None = None, key: str | None = None
 ) -> int:
-    """Make the suite's measurements that DIRECTORY does not hold yet, here or on a scheduler's workers; with
-    a key, only what the row of that key needs.
+    """Make the suite's measurements that DIRECTORY does not hold yet, here or on a scheduler's workers.
 
-    Returns 0, 1 when a worker was lost too often, or 3 when no row of the suite could be judged. Raises
-    InputError before the first measurement if the suite cannot be run; after KeyboardInterrupt the same
-    command resumes.
+    With a key, only what the row of that key needs is measured. Returns 0, 1 when a worker was lost too
+    often, or 3 when no row of the suite could be judged. Raises InputError before the first measurement if
+    the suite cannot be run; after KeyboardInterrupt the same command resumes.
     """
     if key is not None:
         suite = with_key(suite, key)
@@ -62,20 +62,23 @@ def run(
         origin: Origin = {"machine": record_machine(directory, machine()), **provenance()}
         remaining = unmeasured(plan, rows)
         done = len(plan) - len(remaining)
-        console.print(f"{suite.name}: {len(plan)} measurements, {done} of them already in {directory}")
+        where = f", {done} of them already in {directory}" if done else ""
+        console.print(f"{suite.name}: {counted(len(plan), 'measurement')}{where}")
         if remaining:
-            with outcomes_of(scheduler, directory, console) as outcomes:
-                rows = measure_remaining(remaining, rows, done, directory, solvers, origin, outcomes, console)
+            display = Display(console, len(remaining), done)
+            measuring = Measuring(directory, rows, solvers, origin, display)
+            with outcomes_of(scheduler, directory, console) as outcomes, display:
+                measuring.measure(remaining, outcomes)
     planned = {m.key for m in plan}
     code = summary([row for row in rows if row["key"] in planned], console)
-    missing = len(unmeasured(plan, rows))
-    if missing:
-        console.print(f"Not measured: {missing}. Run the same command again.", style="red")
+    if missing := unmeasured(plan, rows):
+        of = counted(len(missing), "measurement")
+        console.print(f"{of} could not be made; the same command tries again.", style="red")
     return FAILED if missing else code
 
 
 def unmeasured(plan: list[Measurement], rows: list[Row]) -> list[Measurement]:
-    """Those without a row that need one."""
+    """The measurements of a plan that need a row and have none."""
     done = {row["key"] for row in rows}
     return [m for m in plan if m.key not in done and still_needed(m, rows) is not None]
 
@@ -83,13 +86,13 @@ def unmeasured(plan: list[Measurement], rows: list[Row]) -> list[Measurement]:
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
     """The suite with the usual form for each entry that names none."""
     entries = zip(suite.solver, descriptions, strict=True)
-    filled = [e.model_copy(update={"forms": e.forms or [found.default_form]}) for e, found in entries]
+    filled = [e.model_copy(update={"forms": e.forms or [solver.default_form]}) for e, solver in entries]
     return suite.model_copy(update={"solver": filled})
 
 
 #: A task that is being done, and the problem that its answers are judged on.
 Pending = tuple[Task, ReferenceProblem]
-#: Does tasks, each beside what stays here; gives back the latter with the result, or what was raised.
+#: Does tasks, each beside what stays here; gives back the latter with the result, or with the exception.
 Outcomes = Callable[[Iterator[tuple[Pending, Task]]], Iterator[tuple[Pending, TaskResult | BaseException]]]
 
 
@@ -103,102 +106,101 @@ def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Ite
         yield partial(done_as_completed, executor, count, run_task_on_worker)
 
 
-def measure_remaining(
-    remaining: list[Measurement],
-    rows: list[Row],
-    done: int,
-    directory: Path,
-    solvers: Solvers,
-    origin: Origin,
-    outcomes: Outcomes,
-    console: Console,
-) -> list[Row]:
-    """Make the measurements and append their rows. `rows` are those of DIRECTORY so far."""
-    rows, recorded = list(rows), set[tuple[str, str]]()
-    with Display(console, len(remaining), done) as display:
-        for (task, problem), outcome in outcomes(pending_tasks(remaining, rows, directory, solvers, display)):
-            batch = task.batch
+@dataclass
+class Measuring:
+    """Makes measurements and appends their rows to `rows` and to the files of the directory."""
+
+    directory: Path
+    rows: list[Row]
+    solvers: Solvers
+    origin: Origin
+    display: Display
+
+    def measure(self, remaining: list[Measurement], outcomes: Outcomes) -> None:
+        """Make the measurements of a plan that are still needed when their turn comes."""
+        recorded = set[tuple[str, str]]()
+        for (task, problem), outcome in outcomes(self.tasks(remaining)):
             if isinstance(outcome, BaseException):
                 why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
-                console.print(f"{batch[0].key}: not measured: {why}", style="red")
+                self.display.console.print(f"{task.batch[0].key}: not measured: {why}", style="red")
                 continue
-            of_worker = origin
+            origin = self.origin
             if outcome.machine and outcome.code:
-                of_worker = {"machine": record_machine(directory, outcome.machine), **outcome.code}
-            new = rows_of(task, outcome, problem, directory, of_worker)
+                origin = {"machine": record_machine(self.directory, outcome.machine), **outcome.code}
+            rows = rows_of(task, outcome, problem, self.directory, origin)
             name = problem.scene.name, form_family(problem.form)
             if name not in recorded:
-                record(problem, directory)
+                record(problem, self.directory)
                 recorded.add(name)
-            records.append(directory / records.MEASUREMENTS, *new)
-            rows += new
-            for row in new:
-                display.finished(row)
-    return rows
+            records.append(self.directory / records.MEASUREMENTS, *rows)
+            self.rows += rows
+            for row in rows:
+                self.display.finished(row)
 
-
-def pending_tasks(
-    remaining: list[Measurement], rows: list[Row], directory: Path, solvers: Solvers, display: Display
-) -> Iterator[tuple[Pending, Task]]:
-    """One task after another; a scene is opened before its first of a family. `rows` grow meanwhile."""
-    opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
-    made = set[str]()  # the forms whose matrices are
-    for batch in batches(remaining):
-        m = still_needed(batch[0], rows)
-        if m is None:
-            display.passed_over(len(batch))
-            continue
-        if any(problem.scene.name != m.scene for problem in opened.values()):
-            opened, made = {}, set()
-        family = form_family(m.form)
-        if family not in opened:
-            with display.step(m.scene):
-                opened[family] = measurable(m.source, display, m.suite.reference_limit_s, m.form)
-        problem = opened[family]
-        if m.form not in made:
-            _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
-            made.add(m.form)
-        display.progress(f"{m.scene}: {m.solver} {m.form}")
-        limit_s, stop = time_limit(m, rows)
-        batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
-        exceeded = exceeded_on(batch[0], problem.prepared.assembly.junction_size, rows)
-        task = Task(batch, solvers[m.solver, m.variant], exceeded)
-        yield (task, problem), task
+    def tasks(self, remaining: list[Measurement]) -> Iterator[tuple[Pending, Task]]:
+        """One task after another; a scene is opened before its first task of a family of forms."""
+        opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
+        made = set[str]()  # the forms whose matrices are made
+        for batch in batches(remaining):
+            m = still_needed(batch[0], self.rows)
+            if m is None:
+                self.display.passed_over(len(batch))
+                continue
+            if any(problem.scene.name != m.scene for problem in opened.values()):
+                opened, made = {}, set()
+            family = form_family(m.form)
+            if family not in opened:
+                with self.display.step(m.scene):
+                    opened[family] = measurable(m.source, self.display, m.suite.reference_limit_s, m.form)
+            problem = opened[family]
+            if m.form not in made:
+                _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
+                made.add(m.form)
+            self.display.progress(f"{m.scene}: {m.solver} {m.form}")
+            limit_s, stop = time_limit(m, self.rows)
+            batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
+            exceeded = exceeded_on(batch[0], problem.prepared.assembly.junction_size, self.rows)
+            task = Task(batch, self.solvers[m.solver, m.variant], exceeded)
+            yield (task, problem), task
 
 
 def batches(remaining: list[Measurement]) -> list[list[Measurement]]:
     """The measurements that one process makes: one each, or the load cases of a series."""
-    found: dict[object, list[Measurement]] = {}
+    of_process: dict[object, list[Measurement]] = {}
     for m in remaining:
-        found.setdefault(m.key if m.case is None else m.process, []).append(m)
-    return list(found.values())
+        of_process.setdefault(m.key if m.case is None else m.process, []).append(m)
+    return list(of_process.values())
 
 
-def record_machine(directory: Path, found: dict[str, Any]) -> str:
-    """Write DIRECTORY/machine.json, keep that of another machine under another name; returns its name."""
-    new = directory / "machine.json"
+def record_machine(directory: Path, facts: dict[str, Any]) -> str:
+    """Write DIRECTORY/machine.json and return the machine's name.
+
+    The file of another machine is kept under another name.
+    """
+    file = directory / "machine.json"
     for path in sorted(directory.glob("machine*.json")):
         with suppress(OSError, ValueError):
-            if records.parsed(path.read_bytes()).get("machine") == found["machine"]:
-                new = path
+            if records.parsed(path.read_bytes()).get("machine") == facts["machine"]:
+                file = path
                 break
-            if path == new:
+            if path == file:
                 path.rename(path.with_name(f"machine-{len(list(directory.glob('machine*.json')))}.json"))
-    records.replace_object(new, found)
-    return str(found["machine"])
+    records.replace_object(file, facts)
+    return str(facts["machine"])
 
 
 def summary(rows: list[Row], console: Console) -> int:
-    """Say how many rows there are of each verdict; 3 if none could be judged."""
+    """Print how many rows there are of each verdict; the exit code, 3 if none could be judged."""
     counts = Counter(row["verdict"] for row in rows)
-    console.print(", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items()))
+    words = (f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items())
+    console.print(f"Verdicts: {', '.join(words)}.")
     if counts["within"] + counts["outside"]:
         return DONE
     why = "no row has an answer"
     if unjudged := [row for row in rows if row["verdict"] == "cannot_be_judged"]:
         bounds = (row["reference_bound_mm"] for row in unjudged)  # null is an infinite one
         least = min(inf if bound is None else bound for bound in bounds)
-        known = f"the references are proven to {least:.0e} mm" if least < inf else "no reference is proven"
-        why = f"{known}, and a tenth of the limit is needed"
+        proven = f"the references are proven to {least:.0e} mm" if least < inf else "no reference is proven"
+        why = f"{proven}, and a tenth of the limit is needed"
     console.print(f"Nothing could be judged: {why}.", style="red")
     return NOTHING_JUDGED

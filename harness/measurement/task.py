@@ -25,7 +25,7 @@ from .worker import Outcome, measure
 
 @dataclass(frozen=True)
 class Task:
-    """What one process measures: a measurement, or load cases of a series.
+    """The work of one process: a measurement, or load cases of a series.
 
     exceeded_on : the scenes on which the solver exceeded its limits: nothing is run; "" if there are none.
     """
@@ -39,7 +39,7 @@ class Task:
 class TaskResult:
     """The measuring process's part of each row, and the seconds in all.
 
-    From a worker of a scheduler also the answer files (None if there is none), its machine and its code.
+    files, machine, code : from a worker of a scheduler, with None for an answer that has no file.
     """
 
     reports: list[Outcome]
@@ -50,7 +50,7 @@ class TaskResult:
 
 
 def run_task(task: Task, answers: Path) -> TaskResult:
-    """Measure; the answer files go into that directory."""
+    """Measure; the answer files go into the directory `answers`."""
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[Outcome]
     if task.exceeded_on:
@@ -66,7 +66,7 @@ def run_task(task: Task, answers: Path) -> TaskResult:
 
 
 def run_task_on_worker(task: Task) -> TaskResult:
-    """The same on a worker of a scheduler, which has the assembly in its own cache, or builds it first."""
+    """Measure on a worker of a scheduler, which has the assembly in its own cache, or builds it first."""
     first = task.batch[0]
     scene = read_scene(first.source)
     _ = in_form(prepared(scene, form=first.form), first.form).arrays  # made before the clock starts

@@ -1,6 +1,6 @@
 """The measuring process: one solver on one load case, or on those of a series, and nothing else.
 
-Each event is part of the row: the driver merges them, so that what a killed process has reported is kept. An
+Each event is part of the row: the driver merges them, so that the reports of a killed process are kept. An
 event with `phase` (start, solve, save) starts the clock of another limit; one with `status` ends the
 measurement, or the current case of a series.
 """
@@ -41,7 +41,7 @@ START_S = 300.0  # for the imports and opening the data
 SAVE_S = 60.0  # for saving the answer
 PAGE = 4096
 YARDSTICK_REPEATS = 3
-#: What is reported once for all the load cases of a series.
+#: The fields that are reported once for all the load cases of a series.
 SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib")
 
 
@@ -60,8 +60,8 @@ class Unsupported(InvalidAnswer):
 def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Outcome]:
     """Run measurements in one process: one, or load cases of a series. Each answer is saved.
 
-    Returns the process's part of each row: status, message, times, peak memory, … If a case ends the process,
-    those that follow have its status.
+    Returns the process's part of each row: status, message, times, peak memory. If a load case ends the
+    process, the following ones have its status.
     """
     first, finished, fields = measurements[0], list[Outcome](), Row()
     phases = {"start": START_S, "solve": first.time_limit_s * (first.entry.batched or 1), "save": SAVE_S}
@@ -85,7 +85,7 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
 
 
 def measure_here(job: tuple[Sequence[Measurement], Sequence[Path]], events: Events) -> None:
-    """The same, in the process of its own."""
+    """Run the measurements, in the child process."""
     for outcome in Run(*job, events).outcomes():
         events.report(**outcome)
 
@@ -106,11 +106,11 @@ class Run(Reporter):
         self.events.report(phase=phase)
 
     @contextmanager
-    def step(self, name: str, before: float = 0.0) -> Iterator[None]:
-        """Report the seconds of a step, and those before, under its name."""
+    def step(self, name: str, more_s: float = 0.0) -> Iterator[None]:
+        """Report the seconds of a step, and some more, under its name."""
         start = time.perf_counter()
         yield
-        self.events.report(**{name: before + time.perf_counter() - start})
+        self.events.report(**{name: more_s + time.perf_counter() - start})
 
     def outcomes(self) -> Iterator[Outcome]:
         """Solve the load cases: the last event of each."""
@@ -160,7 +160,7 @@ class Run(Reporter):
     def solved_batch(
         self, session: SolverSession, cases: Sequence[LoadCase], answer_files: Sequence[Path]
     ) -> Iterator[Outcome]:
-        """The same for load cases solved at once; each has an equal share of the time."""
+        """Solve load cases at once and save their answers; each has an equal share of the time."""
         problem = session.problem
         start = time.perf_counter()
         loads = problem.loads(cases)
@@ -174,12 +174,12 @@ class Run(Reporter):
         answers = session.solve_batch(loads)
         solve_s = time.perf_counter() - start
         start = time.perf_counter()
-        lams, own = [answer.lam for answer in answers], [answer.x for answer in answers]
-        found = problem.recover(lams, own, cases)
+        lams, xs = [answer.lam for answer in answers], [answer.x for answer in answers]
+        recovered = problem.recover(lams, xs, cases)
         form_s += time.perf_counter() - start
         k = len(cases)
         shares: Report = {"batched": k, "warm": warm, "solve_s": solve_s / k, "form_s": form_s / k}
-        for answer, x, file in zip(answers, found, answer_files, strict=True):
+        for answer, x, file in zip(answers, recovered, answer_files, strict=True):
             yield self.saved(answer, x, file, problem, figures(answer) | shares)
 
     def begin(self, session: SolverSession) -> None:
@@ -192,7 +192,7 @@ class Run(Reporter):
     def saved(
         self, answer: Answer, x: Vector | None, file: Path, problem: Problem, fields: Report
     ) -> Outcome:
-        """Report what the solver returned, and save its answer: the last event."""
+        """Report the figures of an answer, and save it: the last event."""
         stages = " ".join(problem.prepared.opened)
         peak = resident_mib("VmHWM")
         self.begin_phase("save")
@@ -239,9 +239,9 @@ def threads_in_effect() -> Report:
 
 
 def yardstick(Q: Matrix) -> Report:
-    """The speed of the machine beside each solve: a Cholesky factorisation of Q and a product Qv.
+    """The speed of the machine beside each solve: a Cholesky factorisation of Q and a product Qv, s.
 
-    Seconds of each, median of three: m³/3 operations, and one pass over 8m² bytes.
+    Each is the median of three: of m³/3 operations, and of one pass over 8m² bytes.
     """
     v = np.ones(len(Q))
     factor, product = [], []

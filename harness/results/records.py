@@ -87,11 +87,6 @@ def read(path: Path) -> list[Row]:
     return rows
 
 
-def read_complete_rows(path: Path) -> list[Row]:
-    """The complete rows, for a file that is rewritten as rows are added."""
-    return _split(path)[0]
-
-
 def remove_torn_line(path: Path) -> bool:
     """Remove a torn last line; returns whether there was one."""
     _, torn = _split(path)
@@ -180,12 +175,12 @@ def _replacing(path: Path) -> Iterator[BinaryIO]:
         new.unlink(missing_ok=True)
 
 
-def refuse_other(path: Path, before: Row, now: Row) -> None:
-    """Raises InputError, naming each difference, if what PATH holds is of another command: of `before`."""
+def refuse_other(path: Path, recorded: Row, identity: Row) -> None:
+    """Raise InputError, naming each difference, if PATH belongs to a command of another identity."""
     faults = [
-        Fault(str(path), key, before.get(key), f"now {value!r}: {OTHER}")
-        for key, value in parsed(to_line(now)).items()
-        if before.get(key) != value
+        Fault(str(path), key, recorded.get(key), f"now {value!r}: {OTHER}")
+        for key, value in parsed(to_line(identity)).items()
+        if recorded.get(key) != value
     ]
     if faults:
         raise InputError(faults)

@@ -205,7 +205,7 @@ def record_refusal(scene: Scene, directory: Path) -> None:
 
 
 def _recorded(directory: Path) -> dict[str, dict[str, Any]]:
-    return {row["scene"]: row for row in records.read_complete_rows(directory / PROBLEMS)}
+    return {row["scene"]: row for row in records.read(directory / PROBLEMS)}
 
 
 def _put(row: dict[str, Any], directory: Path) -> None:

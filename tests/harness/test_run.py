@@ -61,7 +61,7 @@ def finished(folder: Path) -> Path:
         run, read_suite(str(tiny_joint.write_suite(folder, TWO, yardstick=True))), folder / "finished"
     )
     assert code == 0
-    assert "4 measurements, 0 of them already" in text
+    assert "4 measurements" in text
     return folder / "finished"
 
 
@@ -94,7 +94,7 @@ def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
     (copy / records.MEASUREMENTS).write_bytes(lines[0] + lines[1] + lines[2] + lines[3][:50])
     code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
     assert code == 0
-    assert "the last line was torn" in text
+    assert "the last line was cut off" in text
     assert "4 measurements, 3 of them already" in text
     again = (copy / records.MEASUREMENTS).read_bytes().splitlines(keepends=True)
     assert again[:3] == lines[:3]
@@ -110,7 +110,7 @@ def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path)
     records.rewrite(copy / records.MEASUREMENTS, rows)
     code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
     assert code == 0
-    assert "3 rows are set aside" in text
+    assert ": 3 rows, because the scene" in text
     aside = records.read(copy / records.OUTDATED)
     assert [row[name] for row, name in zip(aside, names, strict=True)] == ["an older one"] * 3
     assert {row["answer"] for row in aside} == {None}

@@ -291,4 +291,4 @@ def test_a_measurement_that_kills_its_workers_is_left_and_said(cluster: Any, tmp
     machine = json.loads((tmp_path / "out" / "machine.json").read_text())
     assert machine["machine"] == row["machine"]
     assert re.search("tiny exact dual .*: not measured: KilledWorker", said)
-    assert "Not measured: 1. Run the same command again." in said
+    assert "1 measurement could not be made; the same command tries again." in said

@@ -188,7 +188,7 @@ def test_other_gaps_are_another_series(two: Path) -> None:
     assert "5 measurements, 4 of them already" in text
     assert len(rows) == 9
     text, rows = made(newton.replace("seed = 9", "seed = 9\nsd = 0.3"), "changed")
-    assert "4 rows are set aside" in text
+    assert ": 4 rows, because the scene" in text
     assert [row["series"]["sd"] for row in rows].count(0.3) == 4
 
 
