@@ -1,7 +1,7 @@
 """The forms, versions and code of a suite's solvers, and the rows of an earlier run that they still hold for.
 
 Libraries and plug-ins are imported in a process of their own, so that one that prints, crashes or hangs does
-no harm; the project's own methods are imported here. A row holds for the same scene, solver, code and accuracy.
+no harm; the project's own methods are imported here. A row holds for the same scene, solver and accuracy.
 """
 
 from __future__ import annotations
