@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -24,8 +25,8 @@ from problems.input.tables import Cells, doubt, is_stray, number
 from report.document.numbers import position
 
 MIB = 1024
-#: The names of displacements and of contact forces.
-HEADINGS = {"x": ("x", "displacement_mm"), "lam": ("lam", "force_N")}
+#: The vectors of an answer, by their names in a file.
+VECTORS = {"x": "x", "displacement_mm": "x", "lam": "lam", "force_N": "lam"}
 ALLOWED = "a .npz or .csv file with numbers"
 CODES = {"within": DONE, "outside": FAILED, "cannot_be_judged": NOTHING_JUDGED}
 
@@ -87,43 +88,45 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
 def read_answer(path: Path) -> dict[str, Vector]:
     """The vectors of a file by name: "x" (displacements) and "lam" (contact forces), or one of them.
 
-    An .npz has arrays of the names in HEADINGS, a .csv columns, as nodes.csv and contacts.csv of `solve`;
+    An .npz has arrays of the names in VECTORS, a .csv columns, as nodes.csv and contacts.csv of `solve`;
     never both names of one vector. Raises InputError.
     """
     if path.suffix.lower() not in (".npz", ".csv"):
         raise InputError.one(path, "suffix", path.suffix, ALLOWED)
     regular_file(path, "file", MIB)
     try:
-        if path.suffix.lower() == ".npz":
-            with np.load(path, allow_pickle=False) as archive:
-                names = archive.files
-                vectors = _named(names, archive.__getitem__)
+        if path.suffix.lower() == ".csv":
+            arrays: Mapping[str, Any] = _columns(path)
         else:
-            columns = _columns(path)
-            vectors = _named(names := list(columns), columns.__getitem__)
+            with np.load(path, allow_pickle=False) as archive:
+                arrays = {name: archive[name] for name in VECTORS if name in archive.files}
     except InputError:
         raise
     except Exception as error:  # numpy, zipfile and csv raise kinds of their own
         raise InputError.one(path, "file", damage(error), ALLOWED) from error
-    if not vectors:
-        wanted = " or ".join(name for headings in HEADINGS.values() for name in headings)
-        raise InputError.one(path, "names", names, wanted)
-    for name, vector in vectors.items():
+    vectors: dict[str, Vector] = {}
+    for heading, array in arrays.items():
+        if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):
+            raise InputError.one(path, heading, f"{array.dtype}, {array.shape}", "a vector of numbers")
+        vector = array.astype(float).ravel()
         wrong = np.flatnonzero(~np.isfinite(vector))
         if len(wrong):
             allowed = f"must be a finite number; {len(wrong)} of {len(vector)} are not"
-            raise InputError.one(path, f"{name}[{wrong[0]}]", float(vector[wrong[0]]), allowed)
+            raise InputError.one(path, f"{heading}[{wrong[0]}]", float(vector[wrong[0]]), allowed)
+        vectors[VECTORS[heading]] = vector
+    if not vectors or len(vectors) < len(arrays):
+        allowed = "x or displacement_mm, lam or force_N: one of them alone"
+        raise InputError.one(path, "names", list(arrays), allowed)
     return vectors
 
 
 def _columns(path: Path) -> dict[str, Vector]:
-    """The columns of HEADINGS in a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
+    """The columns of VECTORS in a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
     table = Cells.of(path, MIB, ())
     rows = table.rows()
-    wanted = [name for names in HEADINGS.values() for name in names]
     heads = ([cell.lstrip("# ") for cell in cells] for _, cells in rows)
-    header = next((cells for cells in heads if not {*wanted}.isdisjoint(cells)), [])
-    names = [name for name in wanted if name in header]
+    header = next((cells for cells in heads if not {*VECTORS}.isdisjoint(cells)), [])
+    names = [name for name in VECTORS if name in header]
     if twice := [name for name in names if header.count(name) > 1]:
         raise InputError.one(path, "names", twice, "each heading once")
     at = [header.index(name) for name in names]
@@ -141,19 +144,3 @@ def _columns(path: Path) -> dict[str, Vector]:
     if 0 not in at and index != ascending and (np.diff(ascending) == 1).all():
         raise InputError.one(path, "first column", header[0], "an index that ascends: sort the rows by it")
     return {name: np.array([row[k] for row in read]) for k, name in enumerate(names)}
-
-
-def _named(names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:
-    """The vectors of HEADINGS that have one of these names. Raises ValueError."""
-    vectors = {}
-    for name, headings in HEADINGS.items():
-        there = [heading for heading in headings if heading in names]
-        if len(there) > 1:
-            raise ValueError(f"has {' and '.join(there)}: give one of them alone")
-        if there:
-            array = np.asarray(read(there[0]))
-            if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):
-                what = f"an array of {array.dtype} of shape {array.shape}"
-                raise ValueError(f"{there[0]} is {what}, not a vector")
-            vectors[name] = array.astype(float).ravel()
-    return vectors

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from math import inf
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, get_args
@@ -106,21 +105,20 @@ def vector(name: str, value: Any, size: int) -> Vector | None:
 
 
 def _count(name: str, value: Any) -> int | None:
-    if value is not None and not (isinstance(value, Integral) and 0 <= int(value) < LARGEST_COUNT):
+    if value is not None and not _within(value, Integral):
         wrong = f"{name} is {shown(value)}; wanted a whole number from 0 to 2⁵³"
         raise InvalidAnswer(wrong, "Give a whole number, or None")
     return None if value is None else int(value)
 
 
 def _seconds(name: str, value: Any) -> float | None:
-    if value is None:
-        return None
-    try:
-        if isinstance(value, Real) and 0 <= float(value) < inf:
-            return float(value)
-    except OverflowError:  # an integer beyond the range of floats
-        pass
-    raise InvalidAnswer(f"{name} is {shown(value)}; wanted seconds", "Give seconds as a float, or None")
+    if value is not None and not _within(value, Real):
+        raise InvalidAnswer(f"{name} is {shown(value)}; wanted seconds", "Give seconds as a float, or None")
+    return None if value is None else float(value)
+
+
+def _within(value: Any, kind: Any) -> bool:
+    return isinstance(value, kind) and bool(0 <= value < LARGEST_COUNT)
 
 
 def shown(value: object) -> str:

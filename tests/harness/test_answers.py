@@ -13,6 +13,7 @@ from harness.solving.session import no_answer
 from harness.solving.solver_answer import LARGEST_DETAILS, InvalidAnswer, checked, examined, figures
 from problems.errors import InputError
 from problems.forms.problem import Problem, in_form
+from problems.input.tables import TableOptions
 from problems.load_cases.measured_gaps import _read
 from solvers.base import Answer, Status
 
@@ -125,7 +126,7 @@ def test_an_unreadable_file_is_told_without_names_of_python(
     path = tmp_path / f"gaps{suffix}"
     path.write_bytes(content)
     with pytest.raises(InputError, match=path.name) as raised:
-        _read(path, 3)
+        _read(path, 3, TableOptions())
     assert "Error" not in str(raised.value)
     assert "pickle" not in str(raised.value)
     assert "BadZip" not in str(raised.value)
