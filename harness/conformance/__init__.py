@@ -1,1 +1,1 @@
-"""Whether a solver keeps the contract, in plain words."""
+"""Checks whether a solver keeps its contract; findings in plain words."""

@@ -30,7 +30,7 @@ NO_ANSWER = "The problem is small and easy: return λ, and x in all forms but th
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with a solver, where it showed, and how to fix it."""
+    """One fault of a solver: the form and the problem where it showed, what is wrong, and how to fix it."""
 
     form: str
     where: str
@@ -42,9 +42,30 @@ class Finding:
 
 
 def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] = FORMS) -> list[Finding]:
-    """All that is wrong with the solver in those of these forms that it takes, in this process.
+    """Test a solver on small problems with known answers, in this process.
 
-    A solver that ends the process or hangs is for isolated.py.
+    Parameters
+    ----------
+    solver_factory : callable
+        Makes a solver: its class, or a function without arguments.
+    forms : sequence of str, optional
+        The forms to test, of those that it takes: "primal", "dual", "sparse".
+
+    Returns
+    -------
+    list of Finding
+        All that is wrong, each with a way to fix it; empty for a sound solver.
+
+    Notes
+    -----
+    The command `check` also finds a solver that hangs or ends its process.
+
+    Examples
+    --------
+    >>> from rivetbench import check_solver
+    >>> from solvers.methods.newton import ActiveSetNewton
+    >>> check_solver(ActiveSetNewton, ("dual",))
+    []
     """
     return first_of_each(findings(solver_factory, forms))
 

@@ -1,4 +1,4 @@
-"""Whether remaining gaps are larger than allowed, and where: of an answer, or of all cases of a series.
+"""Decides whether and where gaps are larger than allowed, in an answer or in all cases of a series.
 
 A gap y is known up to an error e (harness/verification/assess.py). It is larger than allowed if y − e is, and
 not larger if y + e is not. Between the two it cannot be told, nor for an allowed gap below e. A case is

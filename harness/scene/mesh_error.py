@@ -1,4 +1,4 @@
-"""How far the gaps of an answer may move on a finer mesh: estimated from the same joint on other meshes.
+"""Estimates how far the gaps of an answer move on a finer mesh, from the same joint on other meshes.
 
 The proven bound of an answer does not cover the error of the mesh. That error is not known, but shows when
 the joint is solved on another mesh. On a coarser one, with r times the distance between lines,

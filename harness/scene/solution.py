@@ -1,6 +1,4 @@
-"""From a scene to a judged answer with a proven bound, step by step: what `solve` does, as a command and from
-Python.
-"""
+"""Solves a scene step by step: a judged answer with a proven bound, for the command and for Python."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class DoubleDouble:
         return DoubleDouble(*two_sum(hi, error + self.lo))
 
     def scaled(self, units: Vector) -> DoubleDouble:
-        """By powers of two (n,)."""
+        """The sum times powers of two (n,), without rounding."""
         return DoubleDouble(units * self.hi, units * self.lo)
 
     def __getitem__(self, place: Any) -> DoubleDouble:
@@ -106,9 +106,9 @@ class Residual:
     def subtract_product(
         self, panels: Iterable[Panel], longest: int, x: DoubleDouble, sharp: bool = True
     ) -> None:
-        """Mx, x (columns of M, k). panels : of M, no row with more entries.
+        """Subtract Mx. x : (columns of M, k). panels : M in panels, no row with more than `longest` entries.
 
-        sharp : else only M₁x₁ is exact, and (M − M₁)x₁ and M(x − x₁) are rounded, 2⁻ᵇ times smaller.
+        sharp : if false, only M₁x₁ is exact; (M − M₁)x₁ and M(x − x₁), 2⁻ᵇ times smaller, are rounded.
         """
         bits = (53 - int(np.ceil(np.log2(2 * longest)))) // 2 + 1
         unit = _units(x.hi)  # M diag(unit) and x / unit have no rounding
@@ -158,7 +158,7 @@ class Residual:
             self.error[rows] += of_rows @ (of_sparse if sp.issparse(panel) else of_dense)
 
     def subtract_small(self, panels: Iterable[Panel], longest: int, x: Matrix) -> None:
-        """Mx in float64, with its rounding."""
+        """Subtract Mx, computed in float64, with its rounding error."""
         most = abs(x).max(axis=0, initial=0.0)
         of_each = SAFE * np.stack([gamma(longest + MORE) * most, ETA * (1 + most) * (most > 0)])
         for rows, columns, panel in panels:
@@ -178,7 +178,7 @@ def _units(x: Matrix) -> Vector:
 
 
 def row_panels(M: sp.csr_array) -> Iterator[Panel]:
-    """Some rows of M at a time, of those with entries."""
+    """Yields some rows of M at a time; rows without entries are left out."""
     filled = np.flatnonzero(np.diff(M.indptr))
     height = max(ENTRIES_AT_A_TIME * len(filled) // max(M.nnz, 1), 1)
     for start in range(0, len(filled), height):
@@ -192,8 +192,8 @@ def _count(panel: Any) -> Vector:
 
 
 def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[[Matrix], Matrix]]:
-    """The entries of M diag(unit), of each row (r, 1) their number, zeros of a dense M not counted, and the
-    exponent of the largest, and what gives each entry its row's.
+    """The entries of M diag(unit); for each row (r, 1) their number, without the zeros of a dense M, and the
+    exponent of the largest; and a function that repeats figures of rows for their entries.
     """
     if not sp.issparse(panel):
         entries = panel * unit
@@ -208,7 +208,7 @@ def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[
 
 
 def _times(panel: Any, entries: Matrix, x: Matrix) -> Matrix:
-    """The panel with other entries times x; of a dense one, WIDTH columns at a time."""
+    """The panel with other entries times x, WIDTH columns at a time if it is dense."""
     if sp.issparse(panel):
         return np.asarray(_with(panel, entries) @ x)
     total: Matrix = entries[:, :WIDTH] @ x[:WIDTH]

@@ -52,7 +52,25 @@ class Reference:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The judge's part of a row; a figure that does not apply is None."""
+    """The judge's figures on an answer; one that does not apply is None. The formulas are in this file.
+
+    Parameters
+    ----------
+    verdict : str
+        "within" or "outside" the limit, "cannot_be_judged" or "no_answer".
+    reference_bound_mm, displacement_error_mm : float, optional
+        Proven error bound of the reference, and the distance of the answer to it, mm.
+    contact_mismatch : int, optional
+        Contacts open or closed by mistake.
+    min_gap_mm, primal_residual : float, optional
+        The smallest gap, and the largest overlap, mm.
+    dual_residual : float, optional
+        The largest unbalanced or pulling force, N.
+    duality_gap, objective : float, optional
+        Primal minus dual objective, and the primal one, N·mm.
+    backward_error : float, optional
+        Residual of the optimality conditions relative to their terms.
+    """
 
     verdict: Verdict
     reference_bound_mm: float | None = None
