@@ -1,4 +1,4 @@
-"""Shared by the adapters of libraries: a quadratic program in a library's format, settings, the answer.
+"""The common part of the adapters: a quadratic program in a library's format, settings, the answer.
 
 Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms), so an adapter does
 not depend on it; it only tells sparse blocks of P from dense ones. Relative tolerances are 0 if a library has
@@ -75,7 +75,7 @@ def converted(problem: Problem, sparse: bool) -> Converted:
 
 
 def set_absolute(settings: Any, tolerance: float, load: LoadCase) -> None:
-    """Absolute tests only, that of the duality gap included, by the names of PIQP and ProxQP."""
+    """Set absolute tests only, the duality gap's included; PIQP and ProxQP name them alike."""
     settings.eps_abs = tolerance
     settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
     settings.eps_rel = settings.eps_duality_gap_rel = 0.0
@@ -83,8 +83,9 @@ def set_absolute(settings: Any, tolerance: float, load: LoadCase) -> None:
 
 
 def gap_tolerance(tolerance: float, load: LoadCase) -> float:
-    """For the duality gap, which bounds the error ½(x − x*)ᵀK(x − x*): as many N·mm as the tolerance has mm,
-    but no looser than the tolerance itself, and no tighter for it than rounding allows.
+    """The tolerance of the duality gap, which bounds the error ½(x − x*)ᵀK(x − x*).
+
+    As many N·mm as the tolerance has mm, but at most the tolerance in scaled units, and above rounding.
     """
     return min(tolerance, max(tolerance / load.energy, GAP_ROUNDING))
 
@@ -131,7 +132,7 @@ def upper_triangle(blocks: Sequence[Matrix]) -> sp.csc_matrix:
 
 
 def is_sparse(blocks: Sequence[Matrix]) -> bool:
-    """Whether these are SciPy's sparse arrays, as in the sparse form."""
+    """Whether the blocks are SciPy's sparse arrays, as in the sparse form."""
     return sp.issparse(blocks[0])
 
 

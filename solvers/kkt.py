@@ -23,7 +23,7 @@ def kkt_residual(lam: Vector, y: Vector) -> float:
 
 
 def rounding_of(p: Vector, y: Vector) -> float:
-    """About the rounding error of y = Qλ − p, mm, as 4ε max(|p| + |Qλ|)."""
+    """An estimate of the rounding error of y = Qλ − p, mm: 4ε max(|p| + |Qλ|)."""
     return 4 * EPS * float((abs(p) + abs(y + p)).max(initial=0.0))
 
 
@@ -62,7 +62,7 @@ def dual_answer(
 
 
 def largest_rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:
-    """4ε max_i(|p_i| + √q_ii Σ_j √q_jj |λ_j|), mm: no less than 4ε max(|p| + |Q||λ|), without Q."""
+    """4ε max_i(|p_i| + √q_ii Σ_j √q_jj |λ_j|), mm: a bound of 4ε max(|p| + |Q||λ|) that needs no Q."""
     root = np.sqrt(diagonal)
     return 4 * EPS * float((abs(p) + root * (root @ abs(lam))).max(initial=0.0))
 

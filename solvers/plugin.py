@@ -73,7 +73,7 @@ def _user_folders() -> Iterator[Path]:
 
 
 def _imported(file: Path, folders: Iterable[Path]) -> Iterator[Path]:
-    """The files of code in the folders that a file imports, packages' `__init__` included."""
+    """The files in the folders that a file imports, the `__init__` of packages included."""
     try:
         tree = ast.parse(file.read_bytes())
     except (SyntaxError, ValueError):  # compiled, or no Python

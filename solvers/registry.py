@@ -25,7 +25,7 @@ from .base import Solver
 from .options import NO_OPTIONS, require
 from .plugin import load_plugin, plugin_files, solver_class
 
-#: Who stands behind a solver.
+#: The origin of a solver.
 Owner = Literal["ours", "textbook", "library"]
 PACKAGES: dict[Owner, str] = {
     "ours": "solvers.methods",
@@ -48,7 +48,7 @@ def modules() -> dict[str, str]:
 
 
 def owner_of(name: str) -> Owner:
-    """Who stands behind a solver; a plug-in, and what only qpsolvers finds, stands among the libraries."""
+    """The owner of a solver; plug-ins and solvers that only qpsolvers finds count as libraries."""
     module = modules().get(name, "")
     return next((owner for owner, package in PACKAGES.items() if module.startswith(package)), "library")
 

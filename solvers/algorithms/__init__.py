@@ -1,1 +1,1 @@
-"""What the methods are made of: contact sets and pivots, factors, Newton systems, starting points."""
+"""The parts of the methods: contact sets and pivots, factors, Newton systems, starting points."""

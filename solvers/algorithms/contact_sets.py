@@ -1,4 +1,4 @@
-"""The solution of one contact set after another, with M ≈ Q⁻¹ or with factorisations of K in place of Q⁻¹.
+"""Solutions of contact sets, with M ≈ Q⁻¹ or with factorisations of K in place of Q⁻¹.
 
 From a point (λ, y) with y exact, the problem with Q replaced by M⁻¹ has λ⁺ = λ + Mz with z = y⁺ − y. For a
 set C, N the other contacts, y⁺_C = 0 and λ⁺_N = 0, so that
@@ -17,9 +17,9 @@ Appl. 4:303–320, 1969),
 
     (K + ρ A_C A_Cᵀ) dx = A_N λ_N + A_C (ρ y_C − dλ_C),        dλ_C ← dλ_C + ρ (A_Cᵀdx − y_C).
 
-Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; what is left is for the next product with Q.
+Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; the next product with Q corrects the rest.
 
-Springs alone, ever stiffer, find a first set in both ways.
+In both ways, ever stiffer springs find a first set.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from solvers.base import DualLoadCase
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact, or more where K is well conditioned
-KEPT = 2.0**26  # ρ in these units times cond(K): half of the digits of K are left
+KEPT = 2.0**26  # ρ in these units times cond(K): the springs keep half of the digits of K
 PASSES = 2
-GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
+GROWTH = 4.0  # of ρ per step; with twice as much the edge lags, and pivoting then needs more sets
 
 
 @dataclass
 class OpenFactor:
-    """M, and its Cholesky factor on an open set, kept until another one is asked for.
+    """M and its Cholesky factor on the last open set.
 
-    room : its own, where one factor follows another: fresh memory takes longer than the factor.
+    room : the memory of the factors; fresh memory for each would take longer than the factor itself.
     """
 
     M: BandedInverse
@@ -62,13 +62,9 @@ class OpenFactor:
             self.last = self.M.factor(N, self.room)
         return self.last
 
-    def copy(self) -> OpenFactor:
-        """With the same factor, but room of its own for the next one."""
-        return OpenFactor(self.M, self.last)
-
 
 def banded_set(factor: OpenFactor, start: TrialSolution, C: Mask) -> TrialSolution:
-    """λ⁺ and y⁺ of the set C; all vectors are in the order of M, `start.rounding` is |y_C| at the point."""
+    """λ⁺ and y⁺ of the set C, vectors in the order of M. start : the point (λ, y), its rounding |y_C|."""
     M, lam, y = factor.M, start.lam, start.y
     y_C = np.where(C, y, 0.0)
     z: Vector = factor(~C).solve(M.product(y_C) - lam) - y_C
@@ -77,7 +73,7 @@ def banded_set(factor: OpenFactor, start: TrialSolution, C: Mask) -> TrialSoluti
 
 
 def yielding_set(M: BandedInverse, compliance: Vector, start: TrialSolution) -> Mask:
-    """The contact set of springs in place of contacts, ever stiffer; vectors in the order of M.
+    """The contact set of ever stiffer springs in place of contacts; vectors in the order of M.
 
     With springs ρ_i = τ/q_ii and λ⁺ = λ − ρy⁺ on C = {λ − ρy > 0}, λ⁺ = 0 on N (augmented Lagrangian),
 
@@ -102,10 +98,10 @@ def yielding_set(M: BandedInverse, compliance: Vector, start: TrialSolution) -> 
 
 
 class ContactSprings:
-    """K with springs at closed contacts, in place of Q⁻¹; vectors in the order of A.
+    """Factorisations of K with springs at closed contacts, in place of Q⁻¹; vectors in the order of A.
 
-    K : one matrix. order : K with springs at all contacts, whose numbering serves those at any. stiffest :
-    N/mm, of the unknowns at contacts, as a spring at that contact. rho : of the springs at closed contacts.
+    K : one matrix. order : K with springs at all contacts; its numbering serves any set. stiffest : the
+    largest stiffness of an unknown at a contact, N/mm. rho : the stiffness of the springs, N/mm.
     """
 
     def __init__(self, prepared: Prepared) -> None:
@@ -131,10 +127,9 @@ class ContactSprings:
         return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
 
     def first_set(self, load: DualLoadCase) -> Mask:
-        """(m,) the contacts that overlap with springs as stiff as K.
+        """The contacts that overlap with springs as stiff as K, (m,), found from λ = 0 like `yielding_set`.
 
-        As `yielding_set`, from λ = 0: one step of Newton's method per ρ, from the stiffness of the body to
-        that of K.
+        One step of Newton's method per ρ, from the stiffness of the body to that of K.
         """
         A, overlap = self.A, np.maximum(load.p, 0.0)
         C = overlap > 0

@@ -38,10 +38,6 @@ class GrowingFactor:
         """(size, size) view."""
         return self._R[: self.size, : self.size]
 
-    def append(self, d: Vector, sigma: float) -> None:
-        """C ← C ∪ {k}, with d = R⁻ᵀ G_Ck and σ² = G_kk − dᵀd."""
-        self.extend(d[:, None], np.array([[sigma]]))
-
     def extend(self, D: Matrix, T: Matrix) -> None:
         """C ← C ∪ E, with D = R⁻ᵀ G_CE and T upper triangular, TᵀT = G_EE − DᵀD."""
         q, self.size = self.size, self.size + len(T)
@@ -106,7 +102,7 @@ class Border:
 
     @property
     def active(self) -> Indices:
-        """C, including the removed constraints, then the added candidates."""
+        """The set C, including the removed constraints, then the added candidates."""
         return np.append(self.C, self.candidates[self.added])
 
     def direction(self, column: int) -> tuple[Vector, Vector]:

@@ -1,4 +1,4 @@
-"""The interior-point method on min ½λᵀQλ − pᵀλ, λ ≥ 0: Algorithm 3 and Mehrotra's, and where they start.
+"""Interior-point steps and starts for min ½λᵀQλ − pᵀλ, λ ≥ 0: Algorithm 3 and Mehrotra's.
 
 With A = I the unknowns are λ, its slack w and the multiplier y = Qλ − p (the gaps). w = λ holds at the start
 and is preserved by every step, so w is not stored. The residual is s1 = y − (Qλ − p).
@@ -32,10 +32,7 @@ class CgExhausted(Exception):
 
 @dataclass(frozen=True)
 class Point:
-    """λ, y and the gap Qλ − p, which y converges to: a y far larger must not hide it.
-
-    The residual is s1 = −(Qλ − p − y), the duality gap μ = λᵀy/m.
-    """
+    """λ, y and the gap Qλ − p, to which y converges. Residual s1 = y − gap, duality gap μ = λᵀy/m."""
 
     lam: Vector
     y: Vector
@@ -156,13 +153,13 @@ def algorithm_5(Q: Matrix, p: Vector) -> Start:
 
 
 def algorithm_4(prepared: Prepared, load: LoadCase) -> Start:
-    """The same from displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
+    """The start of `algorithm_5` from displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
     A, K = prepared.assembly.A, prepared.assembly.K
     return _opened(lambda lam: A.T @ K.solve(A @ lam), prepared.overlap(load))
 
 
 def _opened(response: Callable[[Vector], Vector], p: Vector) -> Start:
-    """response : Q times a vector."""
+    """The start that multiplying λ opens. response : Q times a vector."""
     lam, Qlam, corrections = _positive_response(response, np.ones(len(p)))  # step 1
     for multiplications in range(1, MAX_STEPS + 1):  # step 2
         y = Qlam - p  # step 3
@@ -176,7 +173,7 @@ def _opened(response: Callable[[Vector], Vector], p: Vector) -> Start:
 
 
 def _positive_response(response: Callable[[Vector], Vector], lam: Vector) -> tuple[Vector, Vector, int]:
-    """λ > 0 with Qλ > 0: the correction λ_i ← −Σ_{j≠i} q_ij λ_j / q_ii + ε below (16), ε the first λ_i."""
+    """A λ > 0 with Qλ > 0: the correction λ_i ← −Σ_{j≠i} q_ij λ_j / q_ii + ε below (16), ε the first λ_i."""
     corrections, epsilon = 0, lam.copy()
     for _ in range(MAX_STEPS):
         Qlam = response(lam)

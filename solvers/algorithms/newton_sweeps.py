@@ -9,21 +9,22 @@ From (λ, y), y exact, the next point solves the problem with Q replaced by M⁻
 by a few contact sets of block principal pivoting, each a band factorisation, and takes y = Qλ⁺ − p, for all
 load cases in one product. A sweep reduces the error by max|1 − eig(MQ)|, about 0.1 on a joint of plates. On a
 set that no longer changes, sweeps are steps of the conjugate gradient method preconditioned with M, and y
-follows by its change Q(λ⁺ − λ), whose rounding shrinks with it: that of Qλ⁺ − p would come back in every
-sweep, M's error carrying it into soft modes, up to √cond(Q) times as large. `doubt` bounds
+follows by its change Q(λ⁺ − λ), whose rounding shrinks with the step. The rounding of a fresh Qλ⁺ − p would
+return in every sweep, amplified in soft modes by up to √cond(Q). `doubt` bounds
 the rounding that y has accumulated; above twice that of a fresh Qλ − p, y is recomputed.
 
-A case starts from λ + αw, w = D⁻¹Aᵀδf, D = diag(AᵀA), δf its load less that of the case before, or all of it.
-What fasteners press on two parts is a sum of columns of A: then δf = Aw, Qw = δp + δg takes no product, and
-α = 1 leaves x as it was. What contacts cannot carry is left to correct. α in [0, 1] makes ½λᵀQλ − pᵀλ least.
+A case starts from λ + αw, w = D⁻¹Aᵀδf, D = diag(AᵀA), where δf is the change of the load since the solved
+case, or the whole load. The forces of fasteners on two parts are a sum of columns of A: then δf = Aw,
+Qw = δp + δg takes no product, and α = 1 leaves x as it was. The sweeps correct what contacts cannot carry.
+α in [0, 1] minimises ½λᵀQλ − pᵀλ.
 
-An edge of contact creeps by about a row of contacts per set. Where the first sets do, the set of yielding
-contacts takes their place (`contact_sets.yielding_set`), whose edges move further. As long as λ is far from
-the solution, a product corrects more than further sets; so the limit on the sets of a sweep grows with them.
+An edge of contact creeps by about a row of contacts per set. If the first sets creep, the set of yielding
+contacts (`contact_sets.yielding_set`), whose edges move further, replaces them. Far from the solution a
+product corrects more than further sets, so the limit on the sets of a sweep grows from sweep to sweep.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -37,12 +38,12 @@ from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wron
 from .contact_sets import ContactSprings, OpenFactor, banded_set, yielding_set
 
 MAX_SWEEPS = 200
-FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
-PATIENCE = 3  # the contact set of the first sweep at which it is seen whether edges creep
-TARGET = 0.02  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
-STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve the residual, at one that can be rounding
-SMALL = 2.0  # of the rounding of y: one that y may have brought along
-STEP_RANGE = 0.5, 2.0  # on an unchanged set; beyond it, a step is rounding
+FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and their growth per sweep
+PATIENCE = 3  # contact sets of the first sweep before creeping edges change the method
+TARGET = 0.02  # of the tolerance: the |y_C| of a settled case; x can be off by some hundred times that
+STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve a residual below the second number: rounding
+SMALL = 2.0  # largest doubt, in units of the rounding of a fresh y
+STEP_RANGE = 0.5, 2.0  # allowed factors of a step on an unchanged set; beyond them it is rounding
 
 
 @dataclass
@@ -94,7 +95,7 @@ class Sweeps:
 
     @cached_property
     def springs(self) -> ContactSprings:
-        """In place of M."""
+        """The replacement of M where there is none."""
         return ContactSprings(self.prepared)
 
     def __call__(self, loads: Sequence[DualLoadCase], tolerance: float) -> list[Answer]:
@@ -179,7 +180,7 @@ class Sweeps:
             force, y = share * force, y + share * moved
             lam = case.trial.lam + force
             C = np.where(force == 0, case.C, lam > 0)
-            factor = None if case.factor is None else case.factor.copy()
+            factor = case.factor and replace(case.factor, room=None)
             trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
             doubt = case.doubt + largest_rounding(self.compliance, load.p[self.order], lam)
             begun.append(Case(load, C, trial, factor, doubt=doubt))

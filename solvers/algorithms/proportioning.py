@@ -36,8 +36,8 @@ from .block_pivoting import TrialSolution, block_pivoting
 from .contact_sets import OpenFactor, banded_set
 
 RESIDUAL_TARGET = 0.1  # of the tolerance
-RECOMPUTED = 50  # steps after which y is computed anew
-STALLED = 5  # computations anew that have not halved the KKT residual: what is left is rounding
+RECOMPUTED = 50  # steps after which y is recomputed from λ
+STALLED = 5  # recomputations that have not halved the KKT residual: the rest is rounding
 STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
 POWER_STEPS = 30  # products for λmax, once per assembly
 MAX_SETS = 200  # contact sets per projection with M
@@ -65,7 +65,7 @@ class Diagonal:
 
 @dataclass
 class Face(Diagonal):
-    """The same, but with M⁻¹ in the preconditioner. factor : of M off the face."""
+    """B of `Diagonal`, but M⁻¹ in the preconditioner. factor : of M off the face."""
 
     factor: OpenFactor
 
@@ -136,7 +136,7 @@ class Proportioning:
                 return bool(done)
 
     def _step(self) -> bool:
-        """False if no direction decreases the objective, as rounding makes it."""
+        """Take a step; False if rounding lets no direction decrease the objective."""
         F = self.lam > 0
         proportional = self._is_proportional(F)
         if proportional and self._conjugate_gradients(F):

@@ -1,4 +1,4 @@
-"""CVXPY, a modelling language, as a road to OSQP or Clarabel, https://www.cvxpy.org: what modelling costs.
+"""CVXPY, a modelling language, which calls OSQP or Clarabel, https://www.cvxpy.org: the cost of modelling.
 
 The set-up is CVXPY's compilation of the model, the solve is the solver with CVXPY's own conversion of its
 answer. The model has P, G as constants and q, h as parameters, so that a further load case is not compiled
@@ -29,7 +29,7 @@ SOLVERS = (None, cp.OSQP, cp.CLARABEL)
 
 @dataclass
 class Model:
-    """A compiled model. data, chain, inverse : of CVXPY, for the values of q and h."""
+    """A compiled model. data, chain, inverse : CVXPY's, for the present values of q and h."""
 
     problem: cp.Problem
     z: cp.Variable

@@ -15,7 +15,6 @@ import qpsolvers
 import scipy.sparse as sp
 from qpsolvers.exceptions import QPError
 
-from problems.errors import InputError
 from solvers.adapter import Converted, dense, gap_tolerance, is_sparse, sorted_csc
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
 from solvers.options import NO_OPTIONS, require
@@ -46,7 +45,7 @@ TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
 }
 
 
-#: Those that overwrite P with its factor.
+#: The solvers that overwrite P with its factor.
 OVERWRITE = ("pyqpmad",)
 
 #: Distributions that have another name than the solver.
@@ -54,14 +53,11 @@ DISTRIBUTIONS = {"highs": "highspy"}
 
 
 class QpSolvers(Solver):
-    """name : the solver's name in qpsolvers.available_solvers. settings : its own, passed on; those that have
-    no tolerance take none.
+    """name : the solver's name in qpsolvers.available_solvers. settings : the solver's, passed on; solvers
+    without a tolerance take none.
     """
 
     def __init__(self, name: str, **settings: object) -> None:
-        if name not in qpsolvers.available_solvers:
-            found = ", ".join(qpsolvers.available_solvers)
-            raise InputError.one("qpsolvers", "solver", name, f"one of those it finds: {found}")
         if name not in TOLERANCE:
             require(name, settings, **dict.fromkeys(settings, (False, NO_OPTIONS)))
         self.name, self.settings = name, settings

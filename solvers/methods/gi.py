@@ -29,7 +29,7 @@ MAX_PIVOTS = 10  # changes of the active set, in units of m
 
 @dataclass(frozen=True, kw_only=True)
 class _Prepared(State):
-    """G : Q in the primal form, Q⁻¹ in the dual one; U : there, Q = UᵀU."""
+    """G : Q in the primal form, Q⁻¹ in the dual one. U : the factor of Q = UᵀU in the dual form."""
 
     G: Matrix
     U: Matrix | None = None
@@ -106,7 +106,7 @@ def _finished(
 def _certain(
     ready: _Prepared, slacks: Slacks, result: GiResult, tolerance: float, details: dict[str, Any]
 ) -> Vector:
-    """λ of the primal form: from block pivoting, if slacks within rounding left the active set in doubt.
+    """λ of the primal form; from block pivoting, if slacks within rounding leave the active set in doubt.
 
     With nearly dependent constraints, an open contact with a slack barely below zero may stand for another
     that is active. λ of the final set of block pivoting is taken if its slacks from the original data are
@@ -179,5 +179,6 @@ def _on_support(ready: _Prepared, p: Vector, lam: Vector, result: GiResult) -> V
             return lam
         for k in negative:
             d = factor.solve_transposed(ready.G[C, k])
-            factor.append(d, float(np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))))
+            sigma = np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))
+            factor.extend(d[:, None], np.array([[sigma]]))
             C = np.append(C, k)

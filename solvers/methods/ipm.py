@@ -52,16 +52,15 @@ class Ipm(Method):
     """Primal–dual interior point.
 
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ 1e-3 √ε_μ mm with s1 = y − (Qλ − p).
-    ε_μ, in N·mm, is the tolerance, which the session's units divide by a length and this by its square; the
-    paper tests μ alone, because it solves its systems exactly.
-    Feasibility is not required below the rounding of Qλ − p, which is at most
-    4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). In addition each contact must be closed or open:
-    min(y_i, q_ii λ_i) at most that or √(0.1 mm/N · ε_μ). A contact that touches without a force is off by
-    √(μ q_ii), more than ε_μ guarantees if the contact is compliant. For the same reason the root mean square
-    of √(q_ii λ_i y_i) has that limit; with q_ii ≤ 0.1 mm/N, ε_μ implies it.
+    ε_μ is the tolerance, in N·mm. The session passes tolerance/ℓ; divided again by ℓ = √load.energy it is an
+    energy in scaled units. The paper tests μ alone, because it solves its systems exactly.
+    Feasibility is not required below the rounding of Qλ − p, at most 4ε max(|p| + |Q|λ) with
+    |q_ij| ≤ √(q_ii q_jj). Each contact must also be decided: min(y_i, q_ii λ_i) is at most that rounding or
+    √(0.1 mm/N · ε_μ), because a contact that touches without a force is off by √(μ q_ii). The root mean
+    square of √(q_ii λ_i y_i) has the same limit; ε_μ implies it if q_ii ≤ 0.1 mm/N.
 
-    If the iteration stalls, because the error of inexact systems in s1 outlasts y or because a step ended
-    too close to the boundary, it restarts with a smaller cg_tolerance and theta (details: restarts).
+    The iteration stalls if the error of inexact systems in s1 outlasts y, or if a step ended too close to the
+    boundary. It then restarts with a smaller cg_tolerance and theta (details: restarts).
 
     Options
     -------

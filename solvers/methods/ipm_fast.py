@@ -43,7 +43,7 @@ class FastIpm(Method):
     """
 
     def state(self, problem: Problem) -> _State:
-        """M, and what the systems need."""
+        """The state with M and the Newton systems."""
         finish = Sweeps(problem.prepared)
         system = Banded(problem.Q, finish.M) if finish.M else Direct(problem.Q)
         return _State(problem=problem, system=system, finish=finish)

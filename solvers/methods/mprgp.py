@@ -26,7 +26,7 @@ MAX_PRODUCTS = 100_000  # with Q
 
 @dataclass(frozen=True, kw_only=True)
 class _State(State):
-    """diagonal : of Q, or about that. alpha : ᾱ of the metric."""
+    """diagonal : of Q, approximately. alpha : ᾱ of the metric."""
 
     diagonal: Vector
     alpha: float
@@ -37,9 +37,9 @@ class _State(State):
 class Mprgp(Method):
     """MPRGP with Γ = 1, from λ = 0 or a warm start.
 
-    Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with y = Qλ − p
-    computed anew, or when such a computation has not halved what is below the tolerance, or five what is
-    above. "solved" if it then is at most max(tolerance, `kkt.largest_rounding`) mm, else "inaccurate".
+    Stops when r = max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with a recomputed
+    y = Qλ − p; or when one recomputation has not halved an r below the tolerance, or five an r above it.
+    "solved" if r is then at most max(tolerance, `kkt.largest_rounding`) mm, else "inaccurate".
     Iterations are steps, inner iterations contact sets tried with M; details count the products with Q per
     load case. In the sparse form the status is that of the refined x (solvers/kkt.py).
 
@@ -57,7 +57,7 @@ class Mprgp(Method):
         require("mprgp", vars(self), preconditioner=one_of(self.preconditioner, PRECONDITIONERS))
 
     def state(self, problem: Problem) -> _State | Answer:
-        """M and ᾱ, by 30 products, as the option needs them; a failed answer if there is no M."""
+        """The state with M and ᾱ, which takes 30 products; a failed answer if there is no M."""
         near = problem.prepared.approximate_inverse
         Q, diagonal, M = problem.prepared.compliance, near.diagonal, near.M
         if M is None:

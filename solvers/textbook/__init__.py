@@ -1,1 +1,1 @@
-"""Textbook methods, short and with SciPy alone: what somebody in contact mechanics writes first."""
+"""Textbook methods, short and with SciPy alone, as an engineer in contact mechanics writes them first."""

@@ -24,16 +24,16 @@ from solvers.options import require
 
 MAX_SWEEPS = 1_000_000
 CHECKED = 10  # sweeps after which y is computed anew
-SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slower is as good as never
+SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual after so many checks; a slower decrease ends the method
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
 class ProjectedGaussSeidel(Method):
     """Projected Gauss–Seidel, from λ = 0 or a warm start.
 
-    Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Qλ|)) mm, looked at after every
-    ten sweeps: "solved"; or when a thousand sweeps have not halved it: "inaccurate". Iterations are sweeps;
-    one counts as a product with Q in the details.
+    "solved" if max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Qλ|)) mm, tested every ten sweeps;
+    "inaccurate" if a thousand sweeps have not halved it. Iterations are sweeps; the details count a sweep as
+    a product with Q.
 
     Options
     -------

@@ -21,7 +21,7 @@ def grow(G: np.ndarray, members: list[int]) -> GrowingFactor:
     factor = GrowingFactor(len(G))
     for count, k in enumerate(members):
         d = factor.solve_transposed(G[members[:count], k])
-        factor.append(d, float(np.sqrt(G[k, k] - d @ d)))
+        factor.extend(d[:, None], np.array([[np.sqrt(G[k, k] - d @ d)]]))
     return factor
 
 
@@ -44,7 +44,7 @@ def test_members_come_and_go_many_times() -> None:
         if rng.random() < 0.5 and outside:
             k = int(rng.choice(outside))
             d = factor.solve_transposed(G[members, k])
-            factor.append(d, float(np.sqrt(G[k, k] - d @ d)))
+            factor.extend(d[:, None], np.array([[np.sqrt(G[k, k] - d @ d)]]))
             members.append(k)
         else:
             position = int(rng.integers(len(members)))

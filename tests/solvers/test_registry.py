@@ -1,5 +1,6 @@
 """Solvers by name, their options, and a user's own solver from a file."""
 
+import doctest
 import re
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import pytest
 from solver_forms import TESTED
 
+import solvers.base
 from problems.errors import InputError
 from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
@@ -70,6 +72,10 @@ def test_bad_names_and_options_are_input_errors(name: str, options: dict[str, An
     assert len(caught.value.faults) == max(1, len(options))
     for word in words:
         assert word in str(caught.value)
+
+
+def test_the_example_of_the_interface_runs() -> None:
+    assert doctest.testmod(solvers.base) == (0, 5)
 
 
 # Plugins.

@@ -121,7 +121,7 @@ def test_one_factor_takes_the_place_of_another_but_not_of_its_copy(tmp_path: Pat
     M, rng = banded_inverse(data.Q, Windows.of(data.assembly.contact_nodes, 45)), np.random.default_rng(2)
     (S, T), b = rng.random((2, 45)) < 0.5, rng.standard_normal(45)
     wanted, factor = M.factor(S).solve(b), OpenFactor(M)
-    first, copy = factor(S), factor.copy()
+    first, copy = factor(S), replace(factor, room=None)
     np.testing.assert_array_equal(copy(T).solve(b), M.factor(T).solve(b))
     assert factor(S) is first
     np.testing.assert_array_equal(first.solve(b), wanted)
