@@ -157,8 +157,8 @@ def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple
         if table is not None:
             faults.append(Fault(str(path), "joint", table, "give either joint or assembly"))
         try:
-            found = assembly_path(path, data.pop("assembly"))
-            return found, read_toml(found)
+            file = assembly_path(path, data.pop("assembly"))
+            return file, read_toml(file)
         except InputError as error:
             faults += error.faults
             return path, {}
@@ -176,33 +176,24 @@ def _joint(
     if not table:
         return None
     parts = table.get("part")
-    of_superelements = isinstance(parts, list) and any(
-        isinstance(part, dict) and "superelement" in part for part in parts
-    )
+    if is_own := isinstance(parts, list) and any(isinstance(p, dict) and "superelement" in p for p in parts):
+        from problems.model.superelement_joint import SuperelementJoint, SuperelementJointTable
+    model: Any = SuperelementJointTable if is_own else Joint
     try:
-        joint: AnyJoint = _of_superelements(path, table) if of_superelements else Joint.model_validate(table)
+        valid = model.model_validate(table)
+        joint: AnyJoint = SuperelementJoint.of(path.parent, valid) if is_own else valid
     except InputError as error:
         faults += error.faults
         return None
     except ValidationError as error:
-        faults += validation_faults(path, Joint, error)
+        faults += validation_faults(path, model, error)
         return None
     new = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
     if new:
         joint = joint.with_contacts((*joint.pairs, *dict.fromkeys(new)))
     wrong = [Fault(str(path), *fault) for fault in joint.faults()]
     faults += wrong
-    return None if of_superelements and wrong else joint  # without places nothing can be said of the effects
-
-
-def _of_superelements(path: Path, table: dict[str, Any]) -> AnyJoint:
-    from problems.model.superelement_joint import SuperelementJoint, SuperelementJointTable
-
-    try:
-        read = SuperelementJointTable.model_validate(table)
-    except ValidationError as error:
-        raise InputError(list(validation_faults(path, SuperelementJointTable, error))) from error
-    return SuperelementJoint.of(path.parent, read)
+    return None if is_own and wrong else joint  # without places nothing can be said of the effects
 
 
 def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> list[EffectTable]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 import warnings
 from pathlib import Path
@@ -19,8 +18,6 @@ from problems.input.text_files import WIDE, read_bytes
 OF_PROBLEM = {"F": "f", "G": "g"}
 SYMMETRIC = 6  # form, of which some programs write one triangle
 GZIP = b"\x1f\x8b"
-HEADER = re.compile(r"(.{24,}?\d[ED])(\d+)(\.\d+.*)", re.IGNORECASE)  # of a matrix: the width of its numbers
-WITHOUT_LETTER = re.compile(r"(\d\.?)([-+]\d+)$")
 
 
 def pyyeti(path: Path) -> Any:
@@ -66,7 +63,7 @@ def _equal(M: Any, other: Any) -> bool:
 
 
 def _plain(path: Path, folder: Path) -> Path:
-    """A path that pyyeti reads: the binary file itself, or a copy of a text with E before each exponent."""
+    """A path that pyyeti reads: the binary file itself, or a copy of a text as `read_bytes` has it."""
     with path.open("rb") as file:
         start = file.read(4)
     if start.count(0) > 2 and not start.startswith((GZIP, *WIDE)):  # two: UTF-16 without a mark
@@ -74,14 +71,6 @@ def _plain(path: Path, folder: Path) -> Path:
     content = read_bytes(path, "file", MIB)
     if 0 in content[:4]:
         raise InputError.one(path, "file", "compressed binary", "binary OUTPUT4 not compressed: gunzip it")
-    copy, width, lines = folder / "text.op4", 0, []
-    for line in content.decode("latin-1").split("\n"):
-        if header := HEADER.fullmatch(line):
-            width = int(header[2])
-            line = f"{header[1]}{width + 1}{header[3]}"
-        elif width and "." in line:
-            words = [line[k : k + width].rstrip() for k in range(0, len(line.rstrip()), width)]
-            line = "".join(WITHOUT_LETTER.sub(r"\1E\2", word).rjust(width + 1) for word in words)
-        lines.append(line)
-    copy.write_text("\n".join(lines), "latin-1", newline="\n")
+    copy = folder / "text.op4"
+    copy.write_bytes(content)
     return copy

@@ -138,17 +138,12 @@ class ElementEffect(PartEffect):
                 yield "part", self.part, allowed
 
     def misfits(self, plate: Plate) -> Faults:
-        """Yield the parameters that do not fit the part, as `faults` does.
+        """Yield the parameters that do not fit the part; see `faults`, and `on_part` for what is allowed.
 
         Parameters
         ----------
         plate : Plate
             The elements of the whole part, in the junction and beyond it.
-
-        Yields
-        ------
-        (str, object, str)
-            The key of the parameter, its value, and what is allowed, as `on_part(plate)`.
         """
         yield from ()
 

@@ -67,9 +67,8 @@ class EffectTable:
                 yield from wrong
                 return
             names, skip, missing = (content.get(key, value) for key, value in FILE_KEYS.items())
-            options = TableOptions(
-                tuple(names.get(name, name) for name in effect.columns), tuple(missing), skip
-            )
+            headings = tuple(names.get(name, name) for name in effect.columns)
+            options = TableOptions(headings, tuple(missing), skip)
             self.rows = read_columns(self.where.parent / str(content["file"]), effect.columns, options)
             content = {key: value for key, value in content.items() if key not in (*FILE_KEYS, "file")}
             content["points"] = self.rows.rows
@@ -78,13 +77,9 @@ class EffectTable:
             if self.rows:
                 self.effect._lines = tuple(f"{self.rows.path.name}, line {line}" for line in self.rows.lines)
         except ValidationError as error:
-            for fault in validation_faults(self.where, effect, error, self._name):
-                key = fault.key.removeprefix(self._name).lstrip(".")
-                if self.rows and (row := re.fullmatch(r"points\.(\d+)\.\d+", key)):
-                    line = f"line {self.rows.lines[int(row[1])]}"
-                    yield Fault(str(self.rows.path), line, fault.value, fault.allowed)
-                elif not self._is_consequence(key):
-                    yield fault
+            faults = validation_faults(self.where, effect, error, self._name)
+            keys = ((fault.key.removeprefix(self._name).lstrip("."), fault) for fault in faults)
+            yield from self._located((key, fault.value, fault.allowed) for key, fault in keys)
         yield from self.rows.faults if self.rows else ()
 
     def _wrong_keys(self, effect: type[Effect]) -> Faults:
@@ -120,15 +115,12 @@ class EffectTable:
     def _located(self, faults: Faults) -> Iterator[Fault]:
         """Yield faults of keys with the place of each: the scene, or the line of a file's row."""
         for key, value, allowed in faults:
-            row = re.fullmatch(r"points\[(\d+)\]", key)
+            row = re.fullmatch(r"points(?:\[(\d+)\]|\.(\d+)\.\d+)", key)
             if self.rows and row:
-                yield Fault(str(self.rows.path), f"line {self.rows.lines[int(row[1])]}", value, allowed)
-            elif not self._is_consequence(key):
-                yield Fault(str(self.where), f"{self._name}.{key}", value, allowed)
-
-    def _is_consequence(self, key: str) -> bool:
-        """Whether a fault of all points, or of the whole table, may be due to bad rows of the file."""
-        return bool(self.rows and self.rows.faults and key in ("", "points"))
+                line = self.rows.lines[int(row[1] or row[2])]
+                yield Fault(str(self.rows.path), f"line {line}", value, allowed)
+            elif not (self.rows and self.rows.faults and key in ("", "points")):  # due to bad rows
+                yield Fault(str(self.where), ".".join(filter(None, [self._name, key])), value, allowed)
 
 
 def effect_kinds() -> list[str]:
