@@ -3,14 +3,18 @@
 min ½λᵀQλ − pᵀλ, λ ≥ 0 is min ‖Uλ − U⁻ᵀp‖, λ ≥ 0 with Q = UᵀU.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.linalg as sla
 import scipy.optimize
 import scipy.sparse as sp
 
 from harness.conformance.known_problems import contact_rows, stiffness
+from problems.forms import Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
+from problems.forms.problem import Problem, in_form
 from problems.stiffness.operator import Stiffness
 
 
@@ -19,6 +23,14 @@ def make_prepared(seed: int, pairs: int, tools: int = 0) -> Prepared:
     random = np.random.default_rng(seed)
     blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
     return Prepared(Assembly(Stiffness.of(*blocks), contact_rows(pairs, tools)))
+
+
+def problem_in(prepared: Prepared, form: Form) -> Problem:
+    """The problem in a form, K with the blocks of that form."""
+    if form == "sparse":
+        assembly = prepared.assembly
+        prepared = Prepared(replace(assembly, K=assembly.K.as_sparse(assembly.nodes)))
+    return in_form(prepared, form)
 
 
 def make_strips(elements: int) -> Prepared:

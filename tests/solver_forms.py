@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 from exact_draws import ExactLoad
+from small_problems import problem_in
 
 from harness.solving.session import SolverSession
 from harness.verification.judge import LIMIT_MM, conditioned_limit
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
 from solvers.base import Answer, Form
 from solvers.libraries.qpsolvers import DISTRIBUTIONS
 from solvers.registry import make_solver, modules, owner_of, solver_names
@@ -44,7 +44,7 @@ ACTIVE_SET = ("gi", "newton", "ipm-fast", "quadprog", "daqp", "nnls", "textbook-
 def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Answer, Vector | None]:
     """The solver's answer, and its displacements where it has any."""
     solver, tolerance = make_solver(name, {}), TOLERANCES.get(name, 1e-9)
-    session = SolverSession(solver, in_form(prepared, form), tolerance)
+    session = SolverSession(solver, problem_in(prepared, form), tolerance)
     session.open()
     answer = session.cold(prepared.with_p([case])[0])
     if answer.lam is None or form != "dual":

@@ -169,15 +169,10 @@ class Sparse(Problem):
     """min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ g over all N unknowns of the model, K̂ and B sparse.
 
     Nothing is condensed: x is û at the junction, and λ is the same as in the other forms. It reads K̂ and B,
-    and no factor. If K has dense blocks, it is copied.
+    and no factor.
     """
 
     form: ClassVar[Form] = "sparse"
-
-    def __init__(self, prepared: Prepared) -> None:
-        dense = prepared.assembly
-        K = dense.K.as_sparse(dense.nodes)
-        super().__init__(prepared if K is dense.K else Prepared(replace(dense, K=K)))
 
 
 def in_form(prepared: Prepared, form: Form) -> Problem:

@@ -9,6 +9,7 @@ import pytest
 import scipy.linalg as sla
 from exact_answer import is_exact
 from sample_size import tried
+from small_problems import problem_in
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
@@ -18,7 +19,6 @@ from harness.verification.reference import best_of_candidates
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
 from problems.build import prepared
 from problems.errors import InputError
-from problems.forms.problem import in_form
 from problems.ladders import ladders, make_rung, rung_names
 from problems.ladders.manufactured import contacts, exact_assembly, spectrum, two_parts
 from problems.model.scene import ManufacturedProblem, ManufacturedScene
@@ -115,7 +115,7 @@ def judged(name: str, solver: str, form: Form, tolerance: float) -> tuple[Answer
     """The answer on a rung and its verdict."""
     base = opened(name)
     data, case = base.prepared, base.load
-    session = SolverSession(make_solver(solver, {}), in_form(data, form), tolerance)
+    session = SolverSession(make_solver(solver, {}), problem_in(data, form), tolerance)
     session.open()
     answer = session.next(data.with_p([case])[0], None)
     assert np.isfinite(answer.lam).all()
@@ -156,7 +156,7 @@ def test_the_suite_measures_every_rung_with_every_solver() -> None:
 @pytest.mark.parametrize("m", [8, 16, 24, 32])
 def test_the_chain_takes_quadratically_many_exchanges(m: int) -> None:
     base = opened(f"hard/pivoting/chain-{m:02d}")
-    gi, problem = make_solver("gi", {}), in_form(base.prepared, "primal")
+    gi, problem = make_solver("gi", {}), problem_in(base.prepared, "primal")
     answer = gi.solve(gi.setup(gi.prepare(gi.convert(problem)), base.load, 1e-10), base.load, 1e-10)
     assert answer.iterations == m**2 // 4 + 4
 

@@ -14,6 +14,7 @@ import pytest
 import scipy.sparse as sp
 from exact_draws import LOADS, ExactLoad, ExactProblem, exact_problem
 from sample_size import Log, draws
+from small_problems import problem_in
 from solver_forms import TOLERANCES, promised, promises
 
 from harness import InputError, own_matrices, solve_dual
@@ -26,7 +27,6 @@ from problems.build import prepared
 from problems.forms import Form
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
 from solvers.registry import make_solver, modules, owner_of
 
 SEED = 16
@@ -147,7 +147,7 @@ def _check_solver(
 ) -> Iterator[tuple[int, Vector]]:
     """One load case after another, warm, and all at once where the solver can; yields the forces."""
     name, form, options = variant
-    session = SolverSession(make_solver(name, options), in_form(data, form), TOLERANCES[name])
+    session = SolverSession(make_solver(name, options), problem_in(data, form), TOLERANCES[name])
     session.open(batched=True)
     loads = session.problem.loads([each.load for each in given])
     answers = [session.next(load, session.nearest(load), k) for k, load in enumerate(loads)]

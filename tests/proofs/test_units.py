@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small_problems import make_load, make_prepared, solve_by_nnls
+from small_problems import make_load, make_prepared, problem_in, solve_by_nnls
 from solver_forms import CASES, SLOW, TESTED, TOLERANCES
 
 from harness.solving.session import SolverSession
@@ -14,7 +14,7 @@ from harness.verification.reference import reference
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Problem, in_form
+from problems.forms.problem import Problem
 from problems.forms.solver_units import Units
 from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
@@ -30,7 +30,7 @@ TAKEN = [name for name in TESTED if owner_of(name) == "library" and "sparse" in 
 def opened(name: str) -> tuple[Problem, LoadCase]:
     """A scene of the gallery in the sparse form, and its load case."""
     scene = read_scene(f"gallery/{name}")
-    problem = in_form(prepared(scene, form="sparse"), "sparse")
+    problem = problem_in(prepared(scene, form="sparse"), "sparse")
     (load,) = problem.loads([load_case(scene, form="sparse")])
     return problem, load
 
@@ -68,7 +68,7 @@ def opened_session(name: str, problem: Problem, tolerance: float) -> SolverSessi
 @pytest.mark.parametrize("form", ["primal", "dual"])
 def test_a_joint_in_mm_is_passed_on_untouched(form: Form) -> None:
     given = make_prepared(1, 8)
-    problem = in_form(given, form)
+    problem = problem_in(given, form)
     (load,) = problem.loads([make_load(2, given)[0]])
     units = Units.of(problem).of_loads([load])
     assert units.scaled() is problem
@@ -135,7 +135,7 @@ def test_a_tolerance_means_mm_at_a_contact(form: Form, metre: float) -> None:
     given = make_prepared(3, 6)
     base, case = rescaled(given, make_load(4, given)[0], np.ones(12), powers(5, 6, 10))
     case = LoadCase(metre * case.f, metre * case.g)
-    problem, seen = in_form(base, form), Seen()
+    problem, seen = problem_in(base, form), Seen()
     session = SolverSession(seen, problem, 1e-9)
     session.open()
     (load,) = problem.loads([case])
@@ -184,7 +184,7 @@ def test_answers_do_not_depend_on_units(name: str, form: Form, bits: int) -> Non
     S, C = powers(4, n, bits), powers(5, m, 40)
     answers: list[list[Answer]] = []
     for data, given in ((base, case), rescaled(base, case, S, C)):
-        problem = in_form(data, form)
+        problem = problem_in(data, form)
         session = opened_session(name, problem, TOLERANCES.get(name, 1e-10))
         first, other = problem.loads([given, LoadCase(given.f, 1.0625 * given.g)])
         found = [session.next(first, None), session.next(other, session.nearest(other))]

@@ -7,14 +7,13 @@ import pytest
 import qpsolvers
 import scipy.linalg as sla
 from proxsuite import proxqp
-from small_problems import make_load, make_prepared, make_strips, solve_by_nnls
+from small_problems import make_load, make_prepared, make_strips, problem_in, solve_by_nnls
 from solver_forms import TESTED
 
 from harness.conformance.check import run
 from harness.solving.session import SolverSession
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
 from solvers.adapter import clipped, dense, upper_triangle
 from solvers.base import DENSE_FORMS, FORMS, Answer, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
@@ -48,7 +47,7 @@ def solved(
 ) -> Answer:
     """As the library gives it: in the units of the problem, without a session."""
     solver = make_solver(name, options)
-    ready = solver.setup(solver.convert(in_form(prepared, form)), load, tolerance)
+    ready = solver.setup(solver.convert(problem_in(prepared, form)), load, tolerance)
     return solver.solve(ready, load, tolerance)
 
 
@@ -58,7 +57,7 @@ def solved(
 def library_of(solver: Any, form: Form, tolerance: float) -> Any:
     prepared = make_prepared(9, 4)
     _, load = make_load(10, prepared)
-    session = SolverSession(solver, in_form(prepared, form), tolerance)
+    session = SolverSession(solver, problem_in(prepared, form), tolerance)
     session.open()
     session.cold(load)
     return session.ready[1]
@@ -127,7 +126,7 @@ def test_a_warm_start_is_taken(name: str, form: Form) -> None:
     prepared, taken = make_prepared(4, 30, 5), []
     loads = [make_load(seed, prepared)[1] for seed in (5, 6)]
     for near in loads:
-        session = SolverSession(make_solver(name, {}), in_form(prepared, form), 1e-9)
+        session = SolverSession(make_solver(name, {}), problem_in(prepared, form), 1e-9)
         session.open()
         session.next(near, None)
         answer = session.next(loads[0], session.nearest(loads[0]))

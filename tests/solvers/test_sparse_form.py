@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from matrix_files import write_mtx
 from scipy.optimize import isotonic_regression
-from small_problems import make_load, make_prepared, make_strips, solve_by_nnls
+from small_problems import make_load, make_prepared, make_strips, problem_in, solve_by_nnls
 from sparse_matrices import band_matrix, graph_matrix
 
 from harness.solving.session import SolverSession
@@ -18,7 +18,6 @@ from problems.build import load_case, prepared
 from problems.forms import compliance
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
 from problems.scene_files import read_scene, scene_names
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.operator import Stiffness
@@ -35,7 +34,7 @@ GALLERY = [
 
 
 def session_of(name: str, data: Prepared, **options: Any) -> SolverSession:
-    made = SolverSession(make_solver(name, options), in_form(data, "sparse"), 1e-10)
+    made = SolverSession(make_solver(name, options), problem_in(data, "sparse"), 1e-10)
     made.open(batched=name == "newton")
     return made
 

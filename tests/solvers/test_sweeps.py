@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from small_joints import two_parts
-from small_problems import definite, make_load, make_prepared, solve_by_nnls
+from small_problems import definite, make_load, make_prepared, problem_in, solve_by_nnls
 from strip_scene import write_strip
 
 from harness.conformance.known_problems import contact_rows
@@ -18,7 +18,6 @@ from problems.forms.assembly import Assembly, DualLoadCase, LoadCase
 from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
 from problems.forms.compliance import DenseCompliance, of_dense
 from problems.forms.prepared import Prepared, dual_alone
-from problems.forms.problem import in_form
 from problems.ladders import make_rung
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
@@ -61,7 +60,7 @@ def decaying() -> np.ndarray:
 
 
 def session_of(data: Prepared, form: str, tolerance: float = TOLERANCE) -> SolverSession:
-    made = SolverSession(make_solver("newton", {}), in_form(data, form), tolerance)
+    made = SolverSession(make_solver("newton", {}), problem_in(data, form), tolerance)
     made.open(batched=True)
     return made
 
