@@ -109,7 +109,7 @@ def _check_problem(factory: Callable[[], Solver], trial: KnownProblem, form: For
     problem, contents = in_form(trial.prepared, form), _contents(trial)
 
     def alone(case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
-        return _Steps(factory(), problem).answer(case, tolerance)
+        return _Steps(factory(), problem, tolerance).answer(case)
 
     answers = [alone(case) for case in trial.cases]
     wrong = [inspect(answer, trial, case, form) for case, answer in zip(trial.cases, answers, strict=True)]
@@ -178,9 +178,9 @@ class _Raised(Exception):
 class _Steps(Reporter):
     """A solver taken through its steps as in a measurement; an exception becomes a finding."""
 
-    def __init__(self, solver: Solver, problem: Problem) -> None:
+    def __init__(self, solver: Solver, problem: Problem, tolerance: float = TOLERANCE) -> None:
         self.problem = problem
-        self.session = SolverSession(solver, problem, TOLERANCE, self)
+        self.session = SolverSession(solver, problem, tolerance, self)
         self.session.open(batched=True)
 
     @contextmanager
@@ -190,8 +190,8 @@ class _Steps(Reporter):
         except (Exception, SystemExit) as error:
             raise _Raised(_raised(self.problem.form, name.removesuffix("_s"), error)) from error
 
-    def answer(self, case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
-        return self.session.cold(case.load, tolerance)
+    def answer(self, case: KnownCase) -> Answer:
+        return self.session.cold(case.load)
 
     def one_by_one(self, cases: Sequence[KnownCase]) -> list[Answer]:
         return [self.answer(case) for case in cases]

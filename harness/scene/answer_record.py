@@ -8,10 +8,10 @@ together with k (a − tᵀx), N, and pushes them apart where that is negative.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from itertools import product, repeat
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,8 +20,7 @@ from harness.results.provenance import machine, provenance, resident_mib
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, Vector
-from problems.model.effect import Effect, SpringEffect
-from problems.model.interface import AnyJoint
+from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
 from problems.model.positions import FORCES
 from problems.model.scene import JointScene, MatricesScene, Scene
@@ -74,7 +73,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "route": reference.route,
         "unusual": scene.unusual if isinstance(scene, JointScene) else [],
         **layout(scene, data.assembly),
-        "fasteners": fastener_forces(scene, solution.x),
+        "fasteners": list(fastener_forces(scene, solution.x)),
         "digits": digits_sentence(problem, solved=True)[0] if _is_given(scene) else None,
         "skipped": list(_skipped(solution, built, solver)),
         "steps": solution.seconds,
@@ -129,18 +128,18 @@ def is_of_plates(scene: Scene) -> bool:
 
 
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
-    """The ranges of parts in the displacements shown and of pairs in λ, and what a picture marks."""
+    """The ranges of parts in the displacements shown and of pairs in λ, and points that a picture marks."""
     if not isinstance(scene, JointScene):
         nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
         spans = zip(assembly.parts, assembly.K.slices, strict=True)
-        parts = [_part(name, s.start, s.stop, _extent(nodes[s])) for name, s in spans]
+        parts = [_part(name, rows, _extent(nodes[rows])) for name, rows in spans]
         pairs = [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else []
         return {"parts": parts, "pairs": pairs, "marks": {}}
     joint, parts, start = scene.joint, [], 0
     for name in joint.names:
         stop, (outline, clamped) = start + len(joint.nodes_of(name)), joint.outline(name)
         held = [point for e in scene.stiffness_effects if e.part == name for point in e.held_points]
-        parts.append(_part(name, start, stop, outline, clamped, held))
+        parts.append(_part(name, slice(start, stop), outline) | {"clamped": list(clamped), "supports": held})
         start = stop
     pairs = [{"pair": p, "start": joint.span(p).start, "stop": joint.span(p).stop} for p in joint.pairs]
     marks: dict[str, list[list[float]]] = {}
@@ -150,11 +149,9 @@ def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
     return {"parts": parts, "pairs": pairs, "marks": marks}
 
 
-def _part(
-    name: str, start: int, stop: int, outline: list[float], clamped: Sequence[str] = (), supports: Any = ()
-) -> dict[str, Any]:
-    ends = {"name": name, "start": start, "stop": stop, "outline": outline}
-    return ends | {"clamped": list(clamped), "supports": list(supports)}
+def _part(name: str, rows: slice, outline: list[float]) -> dict[str, Any]:
+    ends = {"start": rows.start, "stop": rows.stop}
+    return {"name": name, **ends, "outline": outline, "clamped": [], "supports": []}
 
 
 def _extent(nodes: Vector) -> list[float]:
@@ -162,22 +159,19 @@ def _extent(nodes: Vector) -> list[float]:
     return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist()
 
 
-def fastener_forces(scene: Scene, x: Vector) -> list[dict[str, Any]]:
+def fastener_forces(scene: Scene, x: Vector) -> Iterator[dict[str, Any]]:
     """One entry per fastener and contact: kind, pair, x and y in mm, force_N. x : (n,) mm."""
     if not isinstance(scene, JointScene):
-        return []
-    return [entry for effect in scene.effects for entry in _of_effect(effect, scene.joint, x)]
-
-
-def _of_effect(effect: Effect, joint: AnyJoint, x: Vector) -> Iterator[dict[str, Any]]:
-    fastener: Any = effect  # its kind is not imported here, so that no other is
-    if isinstance(effect, SpringEffect):
-        T, k = effect.springs(joint)
-        pairs, forces = effect.tied(joint), (k * (fastener.approach - T.T @ x)).tolist()
-    elif preloads := [getattr(effect, name) for name in FORCES if hasattr(effect, name)]:
-        pairs, forces = fastener.pairs(joint), repeat(*preloads)
-    else:
         return
-    places = product(pairs, fastener.marks(joint).tolist())
-    for (pair, (x, y)), force in zip(places, forces, strict=False):
-        yield {"kind": effect.kind, "pair": list(pair), "x": x, "y": y, "force_N": force}
+    for effect in scene.effects:
+        joint, fastener = scene.joint, cast(Any, effect)  # its kind is not imported, so that no other is
+        if isinstance(effect, SpringEffect):
+            T, k = effect.springs(joint)
+            pairs, forces = effect.tied(joint), (k * (fastener.approach - T.T @ x)).tolist()
+        elif preloads := [getattr(effect, name) for name in FORCES if hasattr(effect, name)]:
+            pairs, forces = fastener.pairs(joint), repeat(*preloads)
+        else:
+            continue
+        places = product(pairs, effect.marks(joint).tolist())
+        for (pair, (at_x, at_y)), force in zip(places, forces, strict=False):
+            yield {"kind": effect.kind, "pair": list(pair), "x": at_x, "y": at_y, "force_N": force}

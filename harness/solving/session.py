@@ -92,12 +92,11 @@ class SolverSession:
             return None
         return min(self.solved, key=lambda other: self.problem.distance(other.load, load), default=None)
 
-    def cold(self, load: LoadCase, tolerance: float | None = None) -> Answer:
+    def cold(self, load: LoadCase) -> Answer:
         """Set up and solve."""
-        tolerance = self.tolerance if tolerance is None else tolerance
         self.units = self.units.of_loads([load])
         with self._step("setup_s"):
-            scaled = self.units.load(load), self.units.tolerance(tolerance)
+            scaled = self.units.load(load), self.units.tolerance(self.tolerance)
             self.ready = self.solver.setup(self.state, *scaled)
         return self._solve(*scaled)
 

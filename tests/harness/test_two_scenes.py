@@ -51,7 +51,7 @@ def test_springs_and_contacts_balance_what_the_parts_without_them_resist(tmp_pat
     scene = read_scene(str(bare))
     data, load = prepared(scene), load_case(scene)
     pull = data.assembly.K.multiply(x) + data.assembly.A @ lam - load.f
-    found = fastener_forces(read_scene(str(tied)), x)
+    found = list(fastener_forces(read_scene(str(tied)), x))
     springs = [entry for entry in found if entry["kind"] == "installed_fasteners"]
     assert [(entry["x"], entry["y"]) for entry in springs] == [(80.0, 40.0), (120.0, 20.0)]
     for entry in springs:
