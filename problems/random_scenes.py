@@ -1,8 +1,8 @@
 """Scenes drawn at random, `drawn/<n>/<k>` with k from 0 to 99 999, on the assemblies wing-fragment-<n>.
 
-Nobody has tuned on them: the SHA-256 of "<version>/<n>/<k>" is eight integers u < 2³², and each draws one
-integer from low to high, as low + ⌊u (high − low + 1) / 2³²⌋. So the scenes of a version are the same on
-every machine, and those of the next version are others.
+The SHA-256 of "<version>/<n>/<k>" is eight integers u < 2³². Each draws one integer from low to high, as
+low + ⌊u (high − low + 1) / 2³²⌋. So the scenes of a version are the same on every machine, and the next
+version has others: nobody can have tuned on them.
 """
 
 import re
@@ -22,7 +22,7 @@ RANGE = re.compile(rf"{NAME.pattern}\.\.([0-9]{{1,5}})")
 
 
 def drawn_names(pattern: str) -> list[str]:
-    """The scenes of a name, or of a range as `drawn/4386/0..59`; none if it is neither."""
+    """The scenes of a name, or of a range such as `drawn/4386/0..59`; none if it is neither."""
     if NAME.fullmatch(pattern):
         return [pattern]
     if not (found := RANGE.fullmatch(pattern)):
@@ -32,7 +32,7 @@ def drawn_names(pattern: str) -> list[str]:
 
 
 def drawn_table(name: str) -> dict[str, Any] | None:
-    """What the file of a drawn scene would hold; None if the name is not one.
+    """The content of a drawn scene's file; None if the name is not that of a drawn scene.
 
     Gap: mean 0.3, 0.6 or 1 mm, standard deviation 0.02 … 0.2 mm, correlation length 80 … 600 mm. Fasteners:
     4 … 32 columns, 1, 2 or 4 rows, 500 … 4000 N each. Pressure on both parts: 10^−6 … 10^−2.2 MPa, uniform in

@@ -43,7 +43,7 @@ class BandedInverse:
     def factor(self, S: Mask, room: Vector | None = None) -> BandFactor:
         """The Cholesky factor of M_SS. Raises LinAlgError if rounding makes it indefinite.
 
-        room : where it is put, as many numbers as the band has; by default fresh memory.
+        room : memory for the factor, as many numbers as the band has; by default it is allocated.
         """
         rows, width = np.flatnonzero(S), len(self.band) - 1
         nearer = np.arange(len(rows)) - np.searchsorted(rows, rows - width)
@@ -164,7 +164,7 @@ class Windows:
         return cls(order, int(line.max()))
 
     def ranges(self) -> Iterator[tuple[int, int, int]]:
-        """For each line of contacts, in the order: where its window begins, where it begins and ends."""
+        """(start of its window, start, end) of each line of contacts, as places in the order."""
         m, across = len(self.order), self.across
         for start in range(0, m, across):
             yield max(start - WINDOW_LINES * across, 0), start, min(start + across, m)

@@ -1,9 +1,11 @@
 """Ladders: problems that grow harder rung by rung, to see where a solver fails and whether it reports that.
 
-A rung is a scene, `hard/<ladder>/<rung>`. A file of this folder has RUNGS, ladders by name, of each its rungs
-by name, the easiest first: functions that make the same rung at every call. Those in FULL_SIZE, where a file
-has it, are `hard-full/<ladder>/<n>-<rung>`, at the sizes of the paper: n = 4386, 6112 and 11308. Problems of
-others, with printed optima, are in OUTSIDE, `outside/<problem>/<size>`.
+A rung is a scene. Each file of this folder may have three tables of ladders by name; a ladder is a table of
+rungs by name, the easiest first, and a rung is a function that makes the same scene at every call:
+
+    RUNGS        hard/<ladder>/<rung>
+    FULL_SIZE    hard-full/<ladder>/<n>-<rung>, at the sizes of the paper: n = 4386, 6112 and 11308
+    OUTSIDE      outside/<problem>/<size>, problems that others wrote, with printed optima
 """
 
 import importlib
@@ -14,13 +16,13 @@ from functools import cache
 
 from problems.model.scene import ManufacturedScene, Scene
 
-#: What the ladders whose scenes' names begin so are called in a file.
+#: The beginning of scenes' names → the name of their table in a file.
 PREFIXES = {"hard/": "RUNGS", "hard-full/": "FULL_SIZE", "outside/": "OUTSIDE"}
 LADDERS = ("hard/", "hard-full/")  # whose limit follows their conditioning
 
 Ladder = Mapping[str, Callable[[], Scene]]
 
-#: A rung of matrices, from its title and its problem. It has no name of its own: the ladder names it.
+#: Makes a rung of matrices from its title and its problem; the ladder gives it its name.
 matrices = ManufacturedScene.of
 
 

@@ -8,8 +8,8 @@ duplicates      nearly equal columns of A, in the end exact copies: a duplicate 
 coincident      two nodes of a part that nearly coincide: a spring between them, ever stiffer than the part
 units           the same problem in other units, and with a unit for each unknown and contact. Powers of two
                 replace the thousands (1024 mm for a metre), so that nothing is rounded
-contact_scale   columns of A and gaps multiplied by 2^−k to 2^k, so that 1 mm is 2^±k in g: what a solver's
-                tolerance means then differs from contact to contact; the answer in mm and N does not
+contact_scale   columns of A and gaps multiplied by 2^−k to 2^k, so that 1 mm is 2^±k in g: the meaning of a
+                solver's tolerance then differs from contact to contact; the answer in mm and N does not
 together        cond(K) grows, a quarter of the contacts are weakly active, each has its own unit
 """
 
@@ -34,7 +34,7 @@ def _conditioned(n: int, seed: int, condition: float) -> Scene:
 
 
 def _beyond(condition: float) -> Scene:
-    """K is no longer exact, which does not matter because it is refused."""
+    """A rung that is refused, so that K need not be exact."""
     d = spectrum(64, condition)
     problem = ManufacturedProblem(exact_assembly(d, d), two_parts(1, 1.0, seed=1).load)
     return matrices(f"Two parts, cond(K) = {condition:g}", problem, refused="K must be positive definite")
@@ -93,7 +93,9 @@ def _together(condition: float) -> Scene:
 def rescaled(
     made: ManufacturedProblem, S: Vector | float, C: Vector | float, v: float
 ) -> ManufacturedProblem:
-    """In x' = S⁻¹x, λ' = C⁻¹λ/v: K' = SKS/v, A' = SAC, f' = Sf/v, g' = Cg. S, C and v powers of two."""
+    """The problem in x' = S⁻¹x and λ' = C⁻¹λ/v, with S, C and v powers of two: K' = SKS/v, A' = SAC,
+    f' = Sf/v and g' = Cg.
+    """
     assert made.x is not None
     assert made.lam is not None
     K, A = made.assembly.K, made.assembly.A

@@ -45,7 +45,7 @@ def contacts(n: int, duplicated: int = 0, tilt: float = 0.0) -> sp.csc_array:
 
 
 def exact_assembly(*d: Vector, A: sp.csc_array | None = None) -> Assembly:
-    """Parts with these eigenvalues times STIFFNESS; by default two equal ones in contact at every node."""
+    """Parts with the eigenvalues STIFFNESS · d; by default two equal parts, in contact at every node."""
     K = Stiffness.of(*(STIFFNESS * _stiffness(part) for part in d))
     names = tuple(f"part {k + 1}" for k in range(len(d)))
     return Assembly(K, contacts(len(d[0])) if A is None else A, None, names)

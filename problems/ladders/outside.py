@@ -86,7 +86,7 @@ def five_point(size: int, edge: float = 1.0) -> sp.csc_array:
 
 
 def nodes(x: Vector, y: Vector) -> Matrix:
-    """(n, 2): the grid of the lines x and y, line x by line x."""
+    """(n, 2) the crossings of the lines x and y, line x by line x."""
     X, Y = np.meshgrid(x, y, indexing="ij")
     return np.column_stack([X.ravel(), Y.ravel()])
 
@@ -94,7 +94,7 @@ def nodes(x: Vector, y: Vector) -> Matrix:
 def bounded(
     K: sp.csc_array, f: Vector, at: Matrix, sign: float, bound: Vector, held: Indices | None = None
 ) -> ManufacturedProblem:
-    """±u ≤ ±`bound` at the unknowns `held`, by default all: a contact each."""
+    """A membrane with ±u ≤ ±`bound` at the unknowns `held`, by default all; each is a contact."""
     rows = np.arange(f.size) if held is None else held
     A = sp.csc_array((np.full(rows.size, sign), (rows, np.arange(rows.size))), shape=(f.size, rows.size))
     assembly = Assembly(Stiffness.of(K, nodes=at), A, at, ("membrane",))
@@ -137,7 +137,7 @@ def _sines(line: Vector) -> Matrix:
 
 
 def _distance(line: Vector) -> Matrix:
-    """To the nearest edge."""
+    """The distance from the nodes of the inner lines to the nearest edge."""
     to_edge = np.minimum(line, 1 - line)
     return np.minimum.outer(to_edge, to_edge)
 
@@ -173,7 +173,7 @@ def _hemisphere(cells: int) -> Scene:
 
 
 def journal_bearing(nx: int, ny: int, eccentricity: float) -> ManufacturedProblem:
-    """With nx × ny inner nodes."""
+    """The oil film with nx × ny inner nodes."""
     hx, hy = 2 * np.pi / (nx + 1), 2 * HALF_WIDTH / (ny + 1)
     w: Vector = (1 + eccentricity * np.cos(hx * np.arange(nx + 2))) ** 3
     # ∫w over the two triangles of a cell: two corners of one are on its left line, of the other on its right.

@@ -42,7 +42,7 @@ def plates(
 
 
 def wing_panel(title: str, n: int, thicker: float = 1.0, **supports: float) -> JointScene:
-    """The packaged assembly with n unknowns: its fragment so much thicker, its supports with other values."""
+    """The packaged assembly with n unknowns, its fragment `thicker` times as thick, its supports changed."""
     joint = tomllib.loads((ASSEMBLIES / f"wing-fragment-{n}.toml").read_text("utf-8"))
     effects = [table | (supports if table["kind"] == "supports" else {}) for table in joint.pop("effect")]
     joint["part"][1]["thickness"] *= thicker

@@ -5,7 +5,7 @@ parts      stiff parts, stacks, a rigid tool, and the smallest possible problems
 floating   parts held by contact alone: K is singular, and the model refuses it
 pivoting   methods that exchange one contact at a time visit contact sets by the thousand
 
-Of the last:
+The rungs of `pivoting`:
 
 fathi, murty: single exchanges of signs visit exponentially many contact sets. Q = LLᵀ, L unit lower
 triangular with 2 below the diagonal, and p = 1 (Fathi, Math. Programming 17:335–344, 1979) or pᵢ = 2 − 2⁻ⁱ,

@@ -11,7 +11,7 @@ from problems.storage import digest
 
 
 class LoadCases(ABC):
-    """Cases first … first + count − 1. Case k depends on k alone, not on `count` or the cases before."""
+    """Load cases, numbered first … first + count − 1. Case k depends on k alone, not on other cases."""
 
     count: int
     #: Sentences on the input that its user reads before a verdict.
@@ -28,17 +28,17 @@ class LoadCases(ABC):
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
 
     def only(self, numbers: Sequence[int]) -> LoadCases:
-        """The data of these cases alone, for a worker. They keep their numbers."""
+        """The data of these cases alone, for a worker; the cases keep their numbers."""
         return self
 
     def parameters(self, k: int) -> dict[str, float | str]:
-        """What distinguishes case k, for its row."""
+        """The values that distinguish case k from others, for its row."""
         return {}
 
 
 @dataclass(frozen=True)
 class Listed(LoadCases):
-    """Case first + k is cases[k]. Cases with the same forces should share the array f: K⁻¹f is made once."""
+    """A list of load cases. Cases with the same forces should share the array f: K⁻¹f is then made once."""
 
     cases: tuple[LoadCase, ...]
     first: int = 0

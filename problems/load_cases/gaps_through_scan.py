@@ -1,7 +1,7 @@
-"""Random gaps that pass through a scan: a Gaussian field given its values at points.
+"""Random gaps that pass through a scan: a Gaussian field whose values at points are measured.
 
-Of z ~ N(0, σ²C) on the joint's grid and a scan d = Wz + ε, with W the weights of its points on that grid and
-ε ~ N(0, (νσ)² I), a field given d is, exactly (Chilès, Delfiner, Geostatistics, 2012, section 7.3.1),
+Let z ~ N(0, σ²C) on the joint's grid, and let the scan be d = Wz + ε, with W the weights of its points on
+that grid and ε ~ N(0, (νσ)² I). Conditional on d the field is (Chilès, Delfiner, Geostatistics, 2012, 7.3.1)
 
     z + CWᵀ (WCWᵀ + ν²I)⁻¹ (d − ε − Wz).
 
@@ -80,7 +80,7 @@ class Scan:
         return cls(W, Cx, Cy, sla.cho_factor((S + S.T) / 2), points[:, 2])
 
     def mean_says(self, mean: float) -> str:
-        """How the mean of all cases, m + CWᵀ(WCWᵀ + ν²I)⁻¹(d − m), misses the scan, and its range."""
+        """How far the mean of all cases, m + CWᵀ(WCWᵀ + ν²I)⁻¹(d − m), misses the scan, and its range."""
         y = sla.cho_solve(self.factor, self.gaps - mean)
         between = mean + _times(self.Cx, self.Cy, self.W.T @ y)
         low, high, missed = between.min(), between.max(), abs(NOISE**2 * y).max()

@@ -126,10 +126,10 @@ def random_gaps(
     if not isinstance(scene, JointScene):
         allowed = "a random field needs a joint; own matrices take a table of gaps (--gaps)"
         raise InputError.one(where, "assembly", "own matrices", allowed)
-    found = list(scene.effects_of(InitialGap))
-    if len(found) > 1:
-        raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
-    table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
+    fields = list(scene.effects_of(InitialGap))
+    if len(fields) > 1:
+        raise InputError.one(where, "initial_gap", f"{len(fields)} effects", "at most one can be random")
+    table: dict[str, Any] = fields[0].model_dump() if fields else {"kind": "initial_gap"}
     law = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
     points, notes = (None, []) if around is None else read_scan(Path(around), scene.joint, options)
     usual = None if points is None else float(points[:, 2].mean())
@@ -138,19 +138,19 @@ def random_gaps(
             allowed = f"remove it: the gaps pass through {around}"
             raise InputError.one(where, "measured_gap", "an effect of the scene", allowed)
         usual = 0.0
-    own = {"mean": table.get("mean", usual)} | (table.get("random") or {})
-    given = own | {key: value for key, value in law.items() if value is not None}
-    if missing := [key for key in law if given.get(key) is None]:
+    values = {"mean": table.get("mean", usual)} | (table.get("random") or {})
+    values |= {key: value for key, value in law.items() if value is not None}
+    if missing := [key for key in law if values.get(key) is None]:
         allowed = "is not in the scene: give --{}, in mm"
         raise InputError([Fault(where, key, None, allowed.format(key.replace("_", "-"))) for key in missing])
-    random = {"sd": given["sd"], "correlation_length": given["correlation_length"], "seed": 0}
+    random = {"sd": values["sd"], "correlation_length": values["correlation_length"], "seed": 0}
     try:
-        field = InitialGap.model_validate(table | {"mean": given["mean"], "random": random})
+        field = InitialGap.model_validate(table | {"mean": values["mean"], "random": random})
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
-    others = [effect for effect in scene.effects if effect not in found]
+    others = [effect for effect in scene.effects if effect not in fields]
     made = RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)
     if made.scan is None:
         return made
-    notes.append(f"The cases pass through {around}: their mean {made.scan.mean_says(given['mean'])}")
+    notes.append(f"The cases pass through {around}: their mean {made.scan.mean_says(values['mean'])}")
     return replace(made, notes=tuple(notes))

@@ -1,7 +1,7 @@
-"""Load cases as a search for a plan of fasteners asks them: each differs little from the one before.
+"""A stream of load cases such as a search for a plan of fasteners solves: each differs little from the last.
 
-Case 2j has the gap of draw j; case 2j + 1 the same gap, and a fastener of the scene less, or one that was
-taken out back.
+Case 2j has the gap of draw j. Case 2j + 1 has the same gap, and one fastener of the scene changes: it is
+taken out, or put back if it was out.
 """
 
 from __future__ import annotations
@@ -31,8 +31,10 @@ def drawn_cases(scene: Scene, form: Form, fasteners: bool = False, **law: Any) -
 
 @dataclass(frozen=True)
 class Stream(LoadCases):
-    """gaps : the draws, with the forces of all fasteners. single : the scene's fasteners, one by one. made :
-    the forces without some of them, by the cases before.
+    """Draws of the gap, and fasteners that come and go.
+
+    gaps : the draws, with the forces of all fasteners. single : the scene's fasteners, one by one. made : the
+    forces of the last case, by the number of changes that led to it.
     """
 
     scene: JointScene
@@ -63,7 +65,7 @@ class Stream(LoadCases):
         return digest(self.gaps.key, "fasteners")
 
     def parameters(self, k: int) -> dict[str, Any]:
-        """The seed of the gap, and the fasteners that are out, by their numbers in the scene."""
+        """The seed of the gap, and the numbers in the scene of the fasteners that are out."""
         out = " ".join(map(str, self._out((k + 1) // 2)))
         return self.gaps.parameters(k // 2) | {"fasteners_out": out}
 
@@ -76,7 +78,7 @@ class Stream(LoadCases):
         return LoadCase(self.made[changes], self.gaps.load(k // 2).g)
 
     def _out(self, changes: int) -> list[int]:
-        """Those that an odd number of the first changes picked."""
+        """The fasteners that are out: an odd number of the first changes picked them."""
         picked = np.zeros(len(self.single), dtype=int)
         for t in range(changes):
             picked[np.random.default_rng((self.gaps.seed, t, 1)).integers(len(picked))] += 1

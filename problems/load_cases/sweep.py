@@ -61,7 +61,7 @@ class Sweep(LoadCases):
 
 
 def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
-    """The cases of some --sweep options. Raises InputError with all faults."""
+    """The load cases of --sweep options. Raises InputError with all faults."""
     if not isinstance(scene, JointScene):
         raise InputError.one("--sweep", "key", ", ".join(texts), f"{NOTHING}; {OTHER}")
     faults: list[Fault] = []
@@ -89,7 +89,7 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
 
 
 def effect_name(scene: JointScene, index: int) -> str:
-    """initial_gap, or pressure.0 and pressure.1 if there are several."""
+    """The name of an effect in --sweep: initial_gap, or pressure.0 and pressure.1 if there are several."""
     kind = scene.effects[index].kind
     alike = [i for i, effect in enumerate(scene.effects) if effect.kind == kind]
     return kind if len(alike) == 1 else f"{kind}.{alike.index(index)}"
@@ -116,17 +116,17 @@ def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
 
 def _numbers(table: dict[str, Any]) -> list[tuple[str, ...]]:
     """The paths of the numbers in an effect's table."""
-    found: list[tuple[str, ...]] = []
+    paths: list[tuple[str, ...]] = []
     for key, value in table.items():
         if isinstance(value, dict):
-            found += [(key, *path) for path in _numbers(value)]
+            paths += [(key, *path) for path in _numbers(value)]
         elif isinstance(value, int | float):
-            found.append((key,))
-    return found
+            paths.append((key,))
+    return paths
 
 
 def _values(text: str) -> tuple[float, ...]:
-    """The values of 0.1:1.0:10 or of 0.1,0.5,1; empty if it is neither."""
+    """The values of a text such as 0.1:1.0:10 or 0.1,0.5,1; none if it is neither."""
     try:
         if ":" in text:
             first, last, count = text.split(":")

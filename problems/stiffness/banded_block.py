@@ -70,7 +70,7 @@ class BandedBlock(SparseBlock):
 
 
 def _norm(L: Matrix) -> float:
-    """‖|L||L|ᵀ‖_∞ ≥ ‖|L||L|ᵀ‖₂, but for a relative rounding of 4bu."""
+    """‖|L||L|ᵀ‖_∞ ≥ ‖|L||L|ᵀ‖₂, up to a relative rounding of 4bu."""
     np.abs(L, out=L)
     width, v = len(L) - 1, np.ones(L.shape[1])
     return float(blas.dtbmv(width, L, blas.dtbmv(width, L, v, lower=1, trans=1), lower=1).max())

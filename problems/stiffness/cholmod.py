@@ -33,7 +33,7 @@ class Cholmod:
             raise np.linalg.LinAlgError("a pivot is not positive") from error
         # The diagonal of DKD is about 1, whatever the order of its unknowns.
         if not (_array(cholmod.diag(self.L)) ** 2 > lost).all():
-            raise np.linalg.LinAlgError("a pivot is but rounding")
+            raise np.linalg.LinAlgError("a pivot is only rounding")
 
     def solve(self, b: Matrix) -> Matrix:
         """K⁻¹b, b (N,) or (N, k)."""
@@ -42,7 +42,7 @@ class Cholmod:
         return (self.D * np.array(x).reshape(b.shape).T).T
 
     def backward_error(self) -> float:
-        """A bound on ‖E‖₂, but for its rounding, where K + E is positive definite.
+        """A bound on ‖E‖₂, up to its rounding, of an E with K + E positive definite.
 
         With B = DKD after a permutation, the computed factor satisfies |B − LLᵀ| ≤ γ_{c+1} |L||L|ᵀ, entry by
         entry and whatever the order of the sums; none has more terms than c, the number of entries in the

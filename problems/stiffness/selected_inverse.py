@@ -1,5 +1,5 @@
-"""The entries of K⁻¹ near the diagonal, from the band factor K = LLᵀ, without the others; and of
-Q = AᵀK⁻¹A for contacts near each other.
+"""Entries of K⁻¹ near the diagonal, from the band factor K = LLᵀ, and from them entries of Q = AᵀK⁻¹A for
+contacts near each other.
 
 With the unknowns in blocks as wide as the band, L has blocks on the diagonal and beside it, and with
 U_i = L_{i+1,i} L_ii⁻¹ the blocks of Z = K⁻¹ follow from the last to the first (Takahashi, Fagan and Chen,
@@ -7,9 +7,8 @@ U_i = L_{i+1,i} L_ii⁻¹ the blocks of Z = K⁻¹ follow from the last to the f
 
     Z_ii = (L_ii L_iiᵀ)⁻¹ + U_iᵀ Z_{i+1,i+1} U_i,        Z_ij = −U_iᵀ Z_{i+1,j},   j > i.
 
-L_ii and L_{i+1,i} are triangular, and so are all products: about 4⅓ b³ operations per block, in single
-precision where that suffices: what is built from them is a preconditioner. Beyond the diagonal only the
-columns asked for are formed.
+L_ii and L_{i+1,i} are triangular, so that a block takes about 4⅓ b³ operations. They are done in single
+precision where that suffices for a preconditioner. Off the diagonal only the columns needed are formed.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ SMALL = 2000  # unknowns between them that are never too many
 class SelectedInverse:
     """K⁻¹ at rows that are at most some distance apart.
 
-    rows : the unknowns asked for, ascending. starts : (blocks + 1,) where each block's begin among them.
-    panels : for each block, its rows of K⁻¹ at its own and the following blocks' unknowns.
+    rows : the unknowns needed, ascending. starts : (blocks + 1,) where those of each block begin.
+    panels : for each block, its rows of K⁻¹ at the unknowns of this and the following blocks.
     """
 
     rows: Indices
@@ -67,7 +66,7 @@ def selected_inverse(L: Matrix, rows: Indices, reach: int, single: bool = True) 
     starts = np.searchsorted(rows, edges)
     panels: list[Entries] = [np.zeros((0, 0), dtype)] * count
     Z = np.zeros((width, width), dtype, order="F")
-    columns = np.zeros((width, 0), dtype, order="F")  # Z_{i+1,j} at the columns asked for, j = i + 1, …
+    columns = np.zeros((width, 0), dtype, order="F")  # Z_{i+1,j} at the columns needed, j = i + 1, …
     for i in reversed(range(count)):
         diagonal, B = band_blocks(L, int(edges[i]), int(edges[i + 1]), width, dtype)
         if len(B) < width:
@@ -81,14 +80,14 @@ def selected_inverse(L: Matrix, rows: Indices, reach: int, single: bool = True) 
         after = columns[:, : starts[min(i + 1 + further, count)] - starts[min(i + 1, count)]]
         if after.size:
             after = trmm(-1.0, inverse, trmm(1.0, B, after, trans_a=1), lower=1, trans_a=1, overwrite_b=1)
-        own = rows[starts[i] : starts[i + 1]] - edges[i]
-        columns = np.asfortranarray(np.hstack([Z[:, own], after]))
-        panels[i] = columns[own]
+        inside = rows[starts[i] : starts[i + 1]] - edges[i]
+        columns = np.asfortranarray(np.hstack([Z[:, inside], after]))
+        panels[i] = columns[inside]
     return SelectedInverse(rows, starts, tuple(panels))
 
 
 def _continued(diagonal: Entries, below: Entries, width: int) -> tuple[Entries, Entries]:
-    """The same, (width, width), as if K continued as the identity."""
+    """The blocks extended to (width, width), as if K continued as the identity."""
     size, dtype = len(diagonal), diagonal.dtype
     D, B = np.eye(width, dtype=dtype, order="F"), np.zeros((width, width), dtype, order="F")
     D[:size, :size], B[: len(below), :size] = diagonal, below
@@ -110,8 +109,9 @@ def _inverse(L: Entries, single: bool) -> Entries:
 
 @dataclass(frozen=True)
 class BlockPart:
-    """A block's part of Q. places, values : (s, m) the entries of each contact in A, as indices into
-    `inverse.rows` and zero-padded values.
+    """The part of Q that one block of K contributes.
+
+    places, values : (s, m) the entries of each contact in A: indices into `inverse.rows`, padded values.
     """
 
     inverse: SelectedInverse
@@ -120,7 +120,7 @@ class BlockPart:
 
     @classmethod
     def of(cls, L: Matrix, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
-        """From the band factor K = LLᵀ, for the contacts in each window; in single or double precision.
+        """The part from the band factor K = LLᵀ, for the contacts in each window.
 
         None if those of a window are too far apart in the numbering of the band.
         """
@@ -135,6 +135,7 @@ class BlockPart:
         return cls(selected_inverse(L, rows, reach, single), np.searchsorted(rows, places), values)
 
     def add_to(self, Q: Matrix, contacts: Indices) -> None:
+        """Add the part to Q at some contacts of a window."""
         places, values = self.places[:, contacts], self.values[:, contacts]
         used = values != 0
         if not used.any():

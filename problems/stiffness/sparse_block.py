@@ -84,9 +84,9 @@ class GeneralBlock(SparseBlock):
 
     @property
     def factor_nonzeros(self) -> int:
-        """Without a narrow band L has about b² log₂ N entries, as in nested dissection of a square grid with
-        that half-bandwidth, for each body (George, SIAM J. Numer. Anal. 10:345–363, 1973). L and U are
-        counted, and their indices.
+        """As many as the library says, else an estimate of L and U with their indices: nested dissection of a
+        square grid with half-bandwidth b leaves about b² log₂ N entries for each body (George, SIAM J. Numer.
+        Anal. 10:345–363, 1973).
         """
         if self.general_factor is not None and self.general_factor.nonzeros is not None:
             return self.general_factor.nonzeros

@@ -38,7 +38,7 @@ class SuperLU:
         return int(self.lu.L.nnz + self.lu.U.nnz)
 
     def backward_error(self) -> float | None:
-        """A bound on ‖E‖₂, but for its rounding, where K + E is positive definite; None if there is none.
+        """A bound on ‖E‖₂, up to its rounding, of an E with K + E positive definite; None if there is none.
 
         After a symmetric permutation the computed factors satisfy |K − LU| ≤ γ_{c+1} |L||U|, entry by entry
         and whatever the order of the sums; none has more terms than c, the number of entries in the longest
@@ -83,8 +83,8 @@ def _factored(K: sp.csc_array) -> Any:
 
 
 def _wrong(lu: Any, K: sp.csc_array, lost: float) -> Any:
-    """Which pivots are not positive. Where one on the diagonal is zero, SuperLU takes another row, whose
-    entry may be positive.
+    """Marks the pivots that count as zero or are negative. Where a diagonal entry is zero, SuperLU takes
+    another row, whose entry may be positive.
     """
     order = np.argsort(lu.perm_c)
     exchanged = np.argsort(lu.perm_r) != order
@@ -92,6 +92,6 @@ def _wrong(lu: Any, K: sp.csc_array, lost: float) -> Any:
 
 
 def _norm(P: Any, R: Any) -> float:
-    """‖PR‖₂ or more, for P, R ≥ 0, but for a relative rounding."""
+    """An upper bound on ‖PR‖₂ for P, R ≥ 0, up to a relative rounding."""
     ones = np.ones(P.shape[0])
     return float(np.sqrt((P @ (R @ ones)).max() * (R.T @ (P.T @ ones)).max()))
