@@ -1,12 +1,12 @@
 """The documentation as a site: `sphinx-build -W -c docs . results/site`. Its pages are those of the clone."""
 
-from typing import Any
-
 from problems import __version__
 
 project = "rivetbench"
 version = release = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+napoleon_google_docstring = False
+napoleon_use_rtype = False
 root_doc = "docs/index"
 include_patterns = [
     "README.md",
@@ -23,12 +23,3 @@ suppress_warnings = ["myst.xref_missing"]  # links to folders; a test follows ev
 html_theme = "furo"
 html_title = f"rivetbench {__version__}"
 html_copy_source = False
-
-
-def setup(app: Any) -> None:
-    """Docstrings are shown as they are written."""
-    app.connect("autodoc-process-docstring", as_written)
-
-
-def as_written(app: Any, what: str, name: str, found: object, options: Any, lines: list[str]) -> None:
-    lines[:] = ["::", "", *(f"    {line}" for line in lines)]

@@ -33,7 +33,22 @@ class Fault:
 
 
 class InputError(ValueError):
-    """All errors in an input, in one exception; `faults` lists them."""
+    """All faults of an input, together.
+
+    Parameters
+    ----------
+    faults : list of Fault
+        Each with `where`, the file or argument; `key`, the entry in it; its `value`; and what is `allowed`.
+
+    Examples
+    --------
+    >>> from rivetbench import InputError, load_scene
+    >>> try:
+    ...     load_scene("galery/three-part-stack")
+    ... except InputError as error:
+    ...     print(error.faults[0].value)
+    galery/three-part-stack
+    """
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.faults = list(faults)

@@ -15,21 +15,55 @@ class Stage(StrEnum):
 
 
 class Reporter:
-    """Is told of steps, of their progress, and sentences for a person; this base class is silent."""
+    """Is told steps, their progress, and sentences for a person; this base class is silent.
+
+    Examples
+    --------
+    >>> from rivetbench import Reporter, solve
+    >>> class Log(Reporter):
+    ...     def say(self, sentence):
+    ...         print(f"{sentence}.")
+    >>> answer = solve("gallery/three-part-stack", reporter=Log())
+    """
 
     def step(self, name: str) -> AbstractContextManager[None]:
-        """A context around a step."""
+        """Enter a step.
+
+        Parameters
+        ----------
+        name : str
+            What is done in it.
+
+        Returns
+        -------
+        context manager
+            Entered at its beginning, left at its end.
+        """
         return nullcontext()
 
     def progress(self, text: str, fraction: float = 0.0) -> None:
-        """Something is done within a step; fraction : how much of it is done, if that is known."""
+        """Take note of what is done within a step.
+
+        Parameters
+        ----------
+        text : str
+            What is done.
+        fraction : float, optional
+            How much of it is done, 0 to 1, if that is known.
+        """
 
     def building(self, stage: Stage, fraction: float = 0.0, part: str = "") -> None:
         """A stage begins or goes on, perhaps of one part."""
         self.progress(f"{stage} {part}".rstrip(), fraction)
 
     def say(self, sentence: str) -> None:
-        """A person should read this sentence, given without its full stop."""
+        """Take note of a sentence that a person should read.
+
+        Parameters
+        ----------
+        sentence : str
+            Without its full stop.
+        """
 
 
 SILENT = Reporter()

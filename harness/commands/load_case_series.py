@@ -152,7 +152,7 @@ def run_series(
     Examples
     --------
     >>> from rivetbench import run_series
-    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
+    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["initial_gap.mean=0.8,0.9"])
     >>> [row["verdict"] for row in done.rows]
     ['within', 'within']
     """

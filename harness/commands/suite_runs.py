@@ -129,7 +129,7 @@ def report(directory: str | Path) -> Path:
     Examples
     --------
     >>> from rivetbench import report, run_series
-    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["pressure.value=1e-4,2e-4"])
+    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["initial_gap.mean=0.8,0.9"])
     >>> report("results/stack").name
     'report.md'
     """

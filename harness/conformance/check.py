@@ -56,6 +56,11 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] = FORMS) -> 
     list of Finding
         All that is wrong, each with a way to fix it; empty for a sound solver.
 
+    Raises
+    ------
+    SystemExit
+        If the solver ends the process.
+
     Notes
     -----
     The command `check` also finds a solver that hangs or ends its process.

@@ -151,7 +151,7 @@ class Explorer:
     --------
     >>> from dataclasses import replace
     >>> from rivetbench import Explorer
-    >>> explorer = Explorer("examples/three-fasteners.toml")
+    >>> explorer = Explorer("examples/small-joint.toml")
     >>> answer = explorer.answer(replace(explorer.settings, preload=2000.0))
     >>> explorer.proven(answer).error_mm < 1e-7
     True

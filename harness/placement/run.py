@@ -127,10 +127,11 @@ def place(
 
     Examples
     --------
-    >>> from rivetbench import place
-    >>> found = place("examples/three-fasteners.toml", "results/two", count=2)
-    >>> len(found.plan)
-    2
+    >>> from rivetbench import GapCases, place
+    >>> cases = GapCases(count=4)
+    >>> best = place("examples/small-joint.toml", "results/two", count=2, share=1.0, cases=cases)
+    >>> best.plan
+    ((40.0, 30.0), (280.0, 30.0))
     """
     source, directory = str(scene), Path(out)
     refuse_unusable(allow_gap_mm)

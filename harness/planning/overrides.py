@@ -22,10 +22,36 @@ WORD = re.compile(r"[\w-]+")  # a text without quotes
 
 @dataclass(frozen=True)
 class Overrides:
-    """What the command line changes in a suite; empty or None leaves it as it is.
+    """Changes of a suite; empty or None leaves it as it is.
 
-    options : "osqp.scaling=0", each with a value as in a suite file. requirements : "piqp==0.6.2", or the
-    name alone for the version installed here.
+    Parameters
+    ----------
+    sizes : tuple of int
+        Only scenes with so many unknowns.
+    scenes : tuple of str
+        These scenes instead of the suite's: names, globs, .toml or .npz files.
+    solvers : tuple of str
+        Only these solvers, in the suite or not.
+    requirements : tuple of str
+        Only these libraries: "piqp==0.6.2", or the name alone for the version installed here.
+    forms : tuple of str
+        Only these forms.
+    tolerances : tuple of float or "auto"
+        Passed to the solvers; "auto": the loosest decade that suffices.
+    options : tuple of str
+        Options of solvers, as "osqp.scaling=0".
+    repeats : int, optional
+        Number of repeats.
+    threads : tuple of int
+        Numbers of threads for linear algebra.
+    time_limit_s : float, optional
+        Time limit per measurement, s.
+    memory_limit_mib : int, optional
+        Memory limit over all processes of a solver, MiB.
+    reference_limit_s : float, optional
+        Limit on the search for each reference, s.
+    plugin : Path, optional
+        A Python file with a solver of your own.
     """
 
     sizes: tuple[int, ...] = ()

@@ -30,6 +30,11 @@ class Incomparable(InputError):
     """Inputs that are each sound but do not belong together; commands end with an exit code of its own.
 
     They are of different problems, limits, machines or suites, or an answer has another problem's length.
+
+    Parameters
+    ----------
+    faults : list of Fault
+        Each with the input, its value, and what it should belong to.
     """
 
 

@@ -66,9 +66,14 @@ class PlainConsole(Console):
 
 
 class ConsoleReporter(Reporter):
-    """A line with the step, its progress and its seconds, gone when the step is over; sentences stay.
+    """Shows the step, its progress and its seconds in a line, gone when the step is over; sentences stay.
 
-    plain : without a terminal, each progress is a line that stays. stages : those that were made.
+    Parameters
+    ----------
+    console : rich.console.Console
+        Where they are shown.
+    plain : bool, optional
+        Without a terminal, each progress is a line that stays.
     """
 
     def __init__(self, console: Console, plain: bool = False) -> None:

@@ -71,7 +71,7 @@ def gate(
     json_file: str | Path | None = None,
     junit_file: str | Path | None = None,
 ) -> GateOutcome:
-    """Judge every gated answer of a run again: is it accurate enough?
+    """Judge every gated answer of a run again, and say whether all are accurate enough.
 
     Parameters
     ----------

@@ -66,10 +66,12 @@ class Judgement:
         The smallest gap, and the largest overlap, mm.
     dual_residual : float, optional
         The largest unbalanced or pulling force, N.
-    duality_gap, objective : float, optional
-        Primal minus dual objective, and the primal one, N·mm.
+    duality_gap : float, optional
+        The primal minus the dual objective, N·mm.
     backward_error : float, optional
         Residual of the optimality conditions relative to their terms.
+    objective : float, optional
+        The primal objective, N·mm.
     """
 
     verdict: Verdict

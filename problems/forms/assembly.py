@@ -102,8 +102,14 @@ class DualLoadCase(LoadCase):
 
     Parameters
     ----------
+    f : array (n,), N
+        Nodal forces.
+    g : array (m,), mm
+        Initial gaps.
     p : array (m,), mm
         AᵀK⁻¹f − g, the overlap of the parts if contact is ignored.
+    energy : float, N·mm
+        As in a LoadCase.
     """
 
     p: Vector

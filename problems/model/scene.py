@@ -30,12 +30,22 @@ class PrintedOptimum:
 
 @dataclass(frozen=True)
 class Scene(ABC):
-    """A checked scene.
+    """A checked scene, made by `load_scene` or `own_matrices`.
 
-    on_ladder : whether it is a rung, whose limit follows its conditioning.
-    refused : text of the InputError that building this rung must raise; "" if it must not raise one.
-    printed : the optimum that the source of the problem prints.
-    sources : the files that it was read from, which no output may replace.
+    Parameters
+    ----------
+    name : str
+        Its name, or the path of its file.
+    title : str
+        One line on what it is.
+    on_ladder : bool
+        Whether it is a rung, whose limit follows its conditioning.
+    refused : str
+        Text of the InputError that building this rung must raise; "" if it must not raise one.
+    printed : PrintedOptimum, optional
+        The optimum that the source of the problem prints.
+    sources : tuple of Path
+        The files that it was read from, which no output may replace.
     """
 
     name: str
@@ -59,7 +69,7 @@ class Scene(ABC):
     @property
     @abstractmethod
     def expected_size(self) -> tuple[int, int] | None:
-        """(n, m) without building anything; None if that takes reading the matrices."""
+        """Numbers (n, m) of unknowns and contacts; None if that takes reading the matrices."""
 
     def source_of(self, matrix: str) -> object:
         """The origin of a matrix, for error messages."""

@@ -188,10 +188,19 @@ def printed_by(page: str, capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
-def test_the_python_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    first, second = printed_by("python.md", capsys).splitlines()
-    assert float(first.split()[1]) < 1e-10
-    assert second == "outside"
+def test_the_python_of_the_page_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All blocks, one after another, in an empty folder beside the examples."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for code in re.findall(r"```python\n(.*?)```", (DOCS / "python.md").read_text("utf-8"), re.DOTALL):
+        exec(code, names)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2] == "outside 1e-06 mm"
+    assert [line.split(":")[0] for line in lines if line[:4] in ("PASS", "FAIL")] == ["PASS", "PASS"]
+    assert lines[-4:-1] == ["[]", "within", "True"]
 
 
 def test_the_bound_of_the_page_is_one(capsys: pytest.CaptureFixture[str]) -> None:

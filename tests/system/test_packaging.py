@@ -16,7 +16,7 @@ import rivetbench
 
 ROOT = Path(__file__).parents[2]
 SUFFIXES = {".toml", ".j2", ".js", ".css", ".csv"}
-LINTERS = {"ruff", "mypy", "import-linter", "pandas-stubs", "types-psutil"}
+LINTERS = {"ruff", "mypy", "import-linter", "pandas-stubs", "types-psutil", "numpydoc"}
 
 
 def test_every_file_beside_the_code_is_in_a_package_that_is_installed() -> None:
