@@ -44,21 +44,20 @@ def dual_answer(
     lam: Vector,
     residual: float,
     details: dict[str, Any],
+    iterations: tuple[int, int | None],
     limit: str = "",
     cause: str = "rounding",
-    *,
-    iterations: int,
-    inner_iterations: int | None = None,
 ) -> Answer:
     """The answer of a method on the dual form, with its KKT residual, and the cause if it is not solved.
 
-    limit : the one that stopped the method, if one did: "inaccurate" then becomes "iteration_limit".
+    iterations : outer and inner ones. limit : the limit that stopped the method, if any; "inaccurate" then
+    becomes "iteration_limit".
     """
     details = details | {"kkt_residual_mm": residual}
     if status != "solved":
         status = "iteration_limit" if limit else "inaccurate"
         details["cause"] = f"{limit or cause}: optimal only to {residual:.1e} mm"
-    return Answer(status, lam, None, iterations, inner_iterations, details=details)
+    return Answer(status, lam, None, *iterations, details=details)
 
 
 def largest_rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:

@@ -96,7 +96,7 @@ def promised(name: str, D: float, m: int, weakest: float, force: float, rounding
     return float(np.sqrt(D * m / weakest) * max(tolerance, rounding)) if weakest > 0 else np.inf
 
 
-def promises(data: Prepared, each: ExactLoad, condition: float) -> dict[str, tuple[float, float]]:
+def promises(data: Prepared, draw: ExactLoad, condition: float) -> dict[str, tuple[float, float]]:
     """max|x − x*|, mm, that each solver's promise and the judge's limit leave.
 
     The latter is for joints no more compliant than ipm assumes, and for units in which 1e-7 mm is more than
@@ -105,10 +105,10 @@ def promises(data: Prepared, each: ExactLoad, condition: float) -> dict[str, tup
     m, c = data.assembly.m, abs(data.assembly.A).max(axis=0).toarray().ravel()
     D = float(np.diag(data.assembly.K.solve(np.eye(data.assembly.n))).max())
     weakest = float(np.linalg.eigvalsh(data.Q / c / c[:, None])[0])
-    size = float(max(abs(v).max() for v in (each.x, data.assembly.K.solve(each.load.f), each.load.g / c)))
+    size = float(max(abs(v).max() for v in (draw.x, data.assembly.K.solve(draw.load.f), draw.load.g / c)))
     rounding = conditioned_limit(0.0, condition, size)
     judged = LIMIT_MM if D <= COMPLIANCE and rounding <= LIMIT_MM else np.inf
-    force = float((c * each.lam).sum())
+    force = float((c * draw.lam).sum())
     return {
         name: (promised(name, D, m, weakest, force, rounding / 10) + rounding, judged) for name in TOLERANCES
     }

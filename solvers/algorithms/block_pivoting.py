@@ -110,7 +110,7 @@ def solve_from(C: Mask, Q: Matrix, p: Vector, tolerance: float) -> Answer:
         y = product(Q, lam) - p
     status, residual = kkt_status(Q, p, lam, y, tolerance)
     details, limit = {"closed": int(result.C.sum())}, "" if result.converged else f"{MAX_SETS} contact sets"
-    return dual_answer(status, lam, residual, details, limit, iterations=result.passes)
+    return dual_answer(status, lam, residual, details, (result.passes, None), limit)
 
 
 def forces_on(C: Mask, Q: Matrix, p: Vector) -> TrialSolution:

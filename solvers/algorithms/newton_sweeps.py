@@ -148,15 +148,8 @@ class Sweeps:
         enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
         limit = "" if case.settled else f"{MAX_SWEEPS} products"
         status: Status = "solved" if enough else "inaccurate"
-        return dual_answer(
-            status,
-            lam,
-            residual,
-            {"closed": int(case.C.sum())},
-            limit,
-            iterations=case.sweeps,
-            inner_iterations=case.sets,
-        )
+        details, counts = {"closed": int(case.C.sum())}, (case.sweeps, case.sets)
+        return dual_answer(status, lam, residual, details, counts, limit)
 
     def vectors(self, case: Case) -> tuple[Vector, Vector]:
         """λ ≥ 0 (m,) N and y (m,) mm, in the order of A."""

@@ -19,6 +19,7 @@ from solvers.adapter import Converted, dense, gap_tolerance, is_sparse, sorted_c
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
 from solvers.options import NO_OPTIONS, require
 
+TINY = float(np.finfo(float).tiny)
 #: Options that set the absolute tolerance, and that of the duality gap. Relative tolerances are 0, iteration
 #: limits too large to matter. DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes none
 #: below 1e-10; by default it adds 1e-7 to the diagonal of P, which with eigenvalues of Q near 1e-5 changed x
@@ -26,12 +27,7 @@ from solvers.options import NO_OPTIONS, require
 TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "cvxopt": lambda tol, gap: {"feastol": tol, "abstol": gap, "reltol": 0.0, "maxiters": 1_000},
     "daqp": lambda tol, gap: {"primal_tol": tol, "dual_tol": min(tol, 1e-12), "iter_limit": 1_000_000},
-    "ecos": lambda tol, gap: {
-        "feastol": tol,
-        "abstol": gap,
-        "reltol": float(np.finfo(float).tiny),
-        "max_iters": 1_000,
-    },
+    "ecos": lambda tol, gap: {"feastol": tol, "abstol": gap, "reltol": TINY, "max_iters": 1_000},
     "highs": lambda tol, gap: {
         "primal_feasibility_tolerance": max(tol, 1e-10),
         "dual_feasibility_tolerance": max(tol, 1e-10),

@@ -5,6 +5,7 @@ hence two matrices H per iteration), the systems solved by conjugate gradients p
 V = U + √D (eq. 15), from the start of Algorithm 5. Each option changes one ingredient.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,7 +39,14 @@ FEASIBILITY = 1e-3  # mm/√(N·mm): the error due to μ is proportional to √�
 RHO, LEAST_GAP = 0.1, 0.01  # of STP1 and STP2: residual allowed, of λᵀy; smallest gap, mm
 MAX_ITERATIONS = 200  # per start or restart
 
-STARTS = ("algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra")
+#: The option `start`.
+STARTS: dict[str, Callable[[Problem, DualLoadCase], Start]] = {
+    "algorithm_5": lambda problem, load: algorithm_5(problem.Q, load.p),
+    "algorithm_4": lambda problem, load: algorithm_4(problem.prepared, load),
+    "stp1": lambda problem, load: stp1(problem.Q, load.p, RHO),
+    "stp2": lambda problem, load: stp2(problem.Q, load.p, RHO, LEAST_GAP),
+    "mehrotra": lambda problem, load: mehrotra_start(problem.Q, load.p),
+}
 ORDERINGS = ("lexicographic", "open_last")
 
 
@@ -133,17 +141,8 @@ class Ipm(Method):
         )
 
     def _start(self, problem: Problem, load: DualLoadCase, details: dict[str, Any]) -> Start:
-        match self.start:
-            case "stp1":
-                return stp1(problem.Q, load.p, RHO)
-            case "stp2":
-                return stp2(problem.Q, load.p, RHO, LEAST_GAP)
-            case "mehrotra":
-                return mehrotra_start(problem.Q, load.p)
         try:
-            if self.start == "algorithm_4":
-                return algorithm_4(problem.prepared, load)
-            return algorithm_5(problem.Q, load.p)
+            return STARTS[self.start](problem, load)
         except NoStart as error:
             details["start_instead"] = f"mehrotra, because {error}"
             return mehrotra_start(problem.Q, load.p)

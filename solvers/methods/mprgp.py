@@ -15,7 +15,7 @@ from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
-from solvers.base import Answer, LoadCase, Problem, failed
+from solvers.base import Answer, LoadCase, Problem, Status, failed
 from solvers.kkt import dual_answer, kkt_residual, largest_rounding, with_x
 from solvers.method import Method, State, first_point
 from solvers.options import one_of, require
@@ -83,13 +83,8 @@ class Mprgp(Method):
         enough = case.solve(tolerance, MAX_PRODUCTS)
         residual = kkt_residual(case.lam, case.y)
         solved = residual <= max(tolerance, largest_rounding(ready.diagonal, dual.p, case.lam))
-        answer = dual_answer(
-            "solved" if solved else "inaccurate",
-            case.lam,
-            residual,
-            {"products": case.products, "steps": case.steps},
-            "" if enough else f"{MAX_PRODUCTS} products",
-            iterations=sum(case.steps.values()),
-            inner_iterations=metric.sets,
-        )
+        status: Status = "solved" if solved else "inaccurate"
+        details = {"products": case.products, "steps": case.steps}
+        counts, limit = (sum(case.steps.values()), metric.sets), "" if enough else f"{MAX_PRODUCTS} products"
+        answer = dual_answer(status, case.lam, residual, details, counts, limit)
         return with_x(ready.problem, [answer], [load], tolerance)[0]

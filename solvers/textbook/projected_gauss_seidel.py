@@ -68,7 +68,7 @@ class ProjectedGaussSeidel(Method):
             y, products = product(Q, lam) - p, products + 1
         status, residual = kkt_status(Q, p, lam, y, tolerance)
         details = {"products": products + sweeps}
-        return dual_answer(status, lam, residual, details, limit, cause, iterations=sweeps)
+        return dual_answer(status, lam, residual, details, (sweeps, None), limit, cause)
 
 
 def _sweep(Q: Matrix, lam: Vector, y: Vector, relaxation: float) -> Vector:

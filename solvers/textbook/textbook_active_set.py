@@ -46,4 +46,4 @@ class TextbookActiveSet(Method):
             y = Q @ lam - p
         status, residual = kkt_status(Q, p, lam, y, tolerance)
         limit = f"{MAX_SETS} sets" if wrong.any() else ""
-        return dual_answer(status, lam, residual, {}, limit, iterations=sets)
+        return dual_answer(status, lam, residual, {}, (sets, None), limit)

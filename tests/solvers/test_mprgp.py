@@ -36,15 +36,15 @@ def test_no_step_increases_the_objective(preconditioner: str) -> None:
     solver, state = opened(preconditioner, prepared)
     metric = solver._metric(state)
     case = Proportioning(prepared.compliance, p, metric.diagonal, metric, lambda lam: Q @ lam - p, 0 * p, -p)
-    before = 0.0
+    other = 0.0
     for _ in range(200):
         if not case._step():
             break
         assert case.lam.min() >= 0
         np.testing.assert_allclose(case.y, Q @ case.lam - p, rtol=0, atol=1e-9 * abs(p).max())
         objective = float(case.lam @ (Q @ case.lam / 2 - p))
-        assert objective <= before + 1e-13 * abs(before)
-        before = objective
+        assert objective <= other + 1e-13 * abs(other)
+        other = objective
     assert case.steps["cg"] * case.steps["proportioning"] > 0
 
 

@@ -38,11 +38,11 @@ def test_pivoting_ends_where_full_exchanges_cycle(stale: int, monkeypatch: pytes
     Q = np.asfortranarray(bending.T @ bending)
     for seed in range(60):
         p = np.random.default_rng(seed).standard_normal(size)
-        found = block_pivoting(lambda C, p=p: forces_on(C, Q, p), p > 0, np.diag(Q), 1e-12, 10_000)
-        assert found.converged
+        result = block_pivoting(lambda C, p=p: forces_on(C, Q, p), p > 0, np.diag(Q), 1e-12, 10_000)
+        assert result.converged
         wanted = by_nnls(Q, p)
-        np.testing.assert_allclose(found.trial.lam, wanted, atol=1e-8 * max(1.0, wanted.max()))
-        descended += found.descents > 0
+        np.testing.assert_allclose(result.trial.lam, wanted, atol=1e-8 * max(1.0, wanted.max()))
+        descended += result.descents > 0
     assert descended > 3
 
 

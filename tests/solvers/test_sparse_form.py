@@ -51,16 +51,16 @@ def check(answer: Answer, dense: Prepared, load: LoadCase) -> None:
 def test_a_scene_of_the_gallery(name: str) -> None:
     """Against the certified reference of the condensed matrices, whose code is another throughout."""
     scene = read_scene(name)
-    known = reference(prepared(scene), load_case(scene))
+    exact = reference(prepared(scene), load_case(scene))
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     for solver in ("newton", "mprgp"):
         answer = session_of(solver, data).next(load, None)
         assert answer.status == "solved"
-        assert abs(data.assembly.at_junction(np.asarray(answer.x)) - known.x).max() <= LIMIT_MM
+        assert abs(data.assembly.at_junction(np.asarray(answer.x)) - exact.x).max() <= LIMIT_MM
         out_of_balance = data.assembly.K.multiply(answer.x) + data.assembly.A @ answer.lam - load.f
         assert abs(out_of_balance).max() <= 1e-9 * data.assembly.K.norm * abs(np.asarray(answer.x)).max()
         closed = (np.asarray(answer.lam) > 0).sum()
-        assert closed == pytest.approx(known.active.sum(), abs=2)  # weakly active ones
+        assert closed == pytest.approx(exact.active.sum(), abs=2)  # weakly active ones
 
 
 def banded(seed: int) -> Prepared:

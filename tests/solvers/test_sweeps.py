@@ -130,11 +130,11 @@ def test_one_factor_takes_the_place_of_another_but_not_of_its_copy(tmp_path: Pat
 def test_m_has_a_narrow_band_where_q_decays_alone() -> None:
     Q = decaying()
     v = np.random.default_rng(2).standard_normal(len(Q))
-    for given, narrow in ((Q, True), (definite(len(Q), 1), False), (Q + 100 * np.outer(v, v), False)):
-        M = of_dense(DenseCompliance(np.asfortranarray(given)), None).M
+    for Q_made, narrow in ((Q, True), (definite(len(Q), 1), False), (Q + 100 * np.outer(v, v), False)):
+        M = of_dense(DenseCompliance(np.asfortranarray(Q_made)), None).M
         assert (len(M.band) < len(Q) / 4) == narrow
         if not narrow:
-            np.testing.assert_allclose(full(M) @ given, np.eye(len(Q)), atol=1e-8)
+            np.testing.assert_allclose(full(M) @ Q_made, np.eye(len(Q)), atol=1e-8)
 
 
 def far(m: int = 120) -> Prepared:
@@ -164,8 +164,8 @@ def test_cold_warm_and_batched_in_any_order_are_the_answer_of_nnls(
         for answer in answers:
             assert answer.status == "solved"
             assert answer.details["closed"] == (lam > 0).sum()
-            own = answer.x if answer.x is not None else made.recover(answer.lam, load)
-            np.testing.assert_allclose(own, x, atol=1e-8)
+            sweeps = answer.x if answer.x is not None else made.recover(answer.lam, load)
+            np.testing.assert_allclose(sweeps, x, atol=1e-8)
     closed = {int((solve_by_nnls(made, load)[1] > 0).sum()) for load in loads}
     assert len(closed) > 2
 
@@ -190,8 +190,8 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     case, first = make_load(1, data)
     closed = solve_by_nnls(data, case)[1] > 0
     second = replace(first, p=first.p + data.Q @ np.where(closed, 1.0, 0.0))  # N more on each closed contact
-    own = Sweeps(data)
-    one, two = (own([load], TOLERANCE)[0] for load in (first, second))
+    sweeps = Sweeps(data)
+    one, two = (sweeps([load], TOLERANCE)[0] for load in (first, second))
     assert two.iterations <= 2
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
@@ -207,13 +207,13 @@ def test_an_edge_of_contact_on_a_fine_mesh_moves_in_few_sets(half_waves: int, le
     """
     x, D = np.linspace(0, 1, 600), np.diff(np.eye(600), 2, axis=0)
     Q = np.linalg.inv(1e4 * D.T @ D + 1e-2 * np.eye(600))
-    own = Sweeps(dual_alone(np.asfortranarray((Q + Q.T) / 2)))
+    sweeps = Sweeps(dual_alone(np.asfortranarray((Q + Q.T) / 2)))
     p, start = level + np.cos(half_waves * np.pi * x), None
     for load in (DualLoadCase(0 * q, -q, q) for q in (p, np.roll(p, 80))):
-        case = own.solved(load, 1e-8, start)
-        assert own.answer(case, 1e-8).status == "solved"
+        case = sweeps.solved(load, 1e-8, start)
+        assert sweeps.answer(case, 1e-8).status == "solved"
         assert case.sets <= 15
-        start = WarmStart(load, *own.vectors(case))
+        start = WarmStart(load, *sweeps.vectors(case))
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
@@ -223,15 +223,15 @@ def test_forces_at_contacts_go_into_the_contacts_below(tmp_path: Path, form: Any
     scene = read_scene(str(tmp_path / "joint.toml"))
     data = prepared(scene, form=form)
     (load,) = data.with_p([load_case(scene, form)])
-    own = Sweeps(data)
-    case = own.solved(load, TOLERANCE)
-    w = np.where(own.vectors(case)[0] > 0, np.random.default_rng(0).uniform(1.0, 2.0, len(load.g)), 0.0)
+    sweeps = Sweeps(data)
+    case = sweeps.solved(load, TOLERANCE)
+    w = np.where(sweeps.vectors(case)[0] > 0, np.random.default_rng(0).uniform(1.0, 2.0, len(load.g)), 0.0)
     near, far = data.with_p([LoadCase(load.f + data.assembly.A @ w, load.g + gap) for gap in (0.0, 1e3)])
-    (begun,) = own._begun([case], [near])
-    np.testing.assert_allclose(begun.trial.lam, case.trial.lam + w[own.order], rtol=1e-9)
+    (begun,) = sweeps._begun([case], [near])
+    np.testing.assert_allclose(begun.trial.lam, case.trial.lam + w[sweeps.order], rtol=1e-9)
     np.testing.assert_allclose(begun.trial.y, case.trial.y, atol=1e-9)
     np.testing.assert_array_equal(begun.C, case.C)
-    (begun,) = own._begun([case], [far])
+    (begun,) = sweeps._begun([case], [far])
     np.testing.assert_array_equal(begun.trial.lam, case.trial.lam)
 
 
@@ -242,9 +242,9 @@ def test_forces_at_contacts_of_unlike_lengths_are_the_contacts_own() -> None:
     data = Prepared(replace(made.assembly, A=sp.csc_array(made.assembly.A.multiply(lengths))))
     w = np.random.default_rng(0).uniform(1.0, 2.0, len(lengths))
     nothing, load = data.with_p([LoadCase(data.assembly.A @ v, 0.0 * w) for v in (0.0 * w, w)])
-    own = Sweeps(data)
-    (begun,) = own._begun([own.solved(nothing, TOLERANCE)], [load])
-    np.testing.assert_allclose(begun.trial.lam, w[own.order], rtol=1e-9)
+    sweeps = Sweeps(data)
+    (begun,) = sweeps._begun([sweeps.solved(nothing, TOLERANCE)], [load])
+    np.testing.assert_allclose(begun.trial.lam, w[sweeps.order], rtol=1e-9)
 
 
 @pytest.mark.parametrize("opened", range(12))
@@ -253,22 +253,22 @@ def test_a_contact_that_a_change_of_load_opens_has_no_force_left(opened: int) ->
     data, w = make_prepared(3, 12), np.random.default_rng(opened).uniform(1.0, 2.0, 12)
     other = np.where(np.arange(12) == opened, -3 * w, w)
     pressed, less = data.with_p([LoadCase(data.assembly.A @ v, np.zeros(12)) for v in (w, other)])
-    own = Sweeps(data)
-    (begun,) = own._begun([own.solved(pressed, TOLERANCE)], [less])
+    sweeps = Sweeps(data)
+    (begun,) = sweeps._begun([sweeps.solved(pressed, TOLERANCE)], [less])
     assert (begun.trial.lam[~begun.C] < 0).any()
-    (case,) = own._sweep([begun], TOLERANCE)
+    (case,) = sweeps._sweep([begun], TOLERANCE)
     assert not case.trial.lam[~case.C].any()
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.1])
 def test_a_start_whose_forces_and_gaps_do_not_belong_together_costs_sweeps_alone(scale: float) -> None:
     Q, random = decaying(), np.random.default_rng(0)
-    own, p = Sweeps(dual_alone(Q)), random.standard_normal(len(Q))
+    sweeps, p = Sweeps(dual_alone(Q)), random.standard_normal(len(Q))
     load = DualLoadCase(p * 0, -p, p)
-    lam, gap = own.vectors(own.solved(load, TOLERANCE))
+    lam, gap = sweeps.vectors(sweeps.solved(load, TOLERANCE))
     start = WarmStart(load, lam * (1 + scale * random.standard_normal(len(lam))), gap)
     for now in (p, 1.001 * p):
-        answer = own.answer(own.solved(DualLoadCase(p * 0, -now, now), TOLERANCE, start), TOLERANCE)
+        answer = sweeps.answer(sweeps.solved(DualLoadCase(p * 0, -now, now), TOLERANCE, start), TOLERANCE)
         assert answer.status == "solved"
         assert residual(Q, now, answer.lam) <= TOLERANCE
 
@@ -308,15 +308,15 @@ def test_where_exchanges_circle_the_sets_settle(seed: int) -> None:
 def test_unsettled_forces_are_cut_at_zero_and_judged_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     Q, p = decaying(), np.random.default_rng(3).standard_normal(LINES * ACROSS)
     monkeypatch.setattr(newton_sweeps, "MAX_SWEEPS", 2)
-    own = Sweeps(dual_alone(Q))
-    case = own.solved(DualLoadCase(p * 0, -p, p), TOLERANCE)
+    sweeps = Sweeps(dual_alone(Q))
+    case = sweeps.solved(DualLoadCase(p * 0, -p, p), TOLERANCE)
     assert not case.settled
-    answer = own.answer(case, TOLERANCE)
+    answer = sweeps.answer(case, TOLERANCE)
     assert (answer.status, answer.iterations) == ("iteration_limit", 2)
     lam = case.trial.lam.copy()
     lam[case.C.argmax()] = -1e-3  # N, cut off, and the gaps are computed again
     case.trial = replace(case.trial, lam=lam)
-    answer = own.answer(case, TOLERANCE)
+    answer = sweeps.answer(case, TOLERANCE)
     wanted = residual(Q, p, answer.lam)
     assert wanted > TOLERANCE
     assert answer.details["kkt_residual_mm"] == pytest.approx(wanted)

@@ -37,11 +37,11 @@ def seconds(row: Row) -> float:
 
 def cells(rows: list[Row]) -> dict[tuple[str, ...], list[Row]]:
     """First repeats by scene, solver, form and variant."""
-    found = defaultdict(list)
+    by_cell = defaultdict(list)
     for row in rows:
         if row["repeat"] == 0:
-            found[row["scene"], row["solver"], row["form"], row["variant"]].append(row)
-    return found
+            by_cell[row["scene"], row["solver"], row["form"], row["variant"]].append(row)
+    return by_cell
 
 
 def test_every_rule_has_its_test_and_every_test_its_rule() -> None:
@@ -93,14 +93,14 @@ def test_stopped_only_when_far_behind() -> None:
             for other in rows_of("speed")
             if other["scene"] == row["scene"] and other["verdict"] == "within" and not other["repeat"]
         ]
-        own = [
+        other_forms = [
             3 * seconds(o)
             for o in within
             if (o["solver"], o["variant"]) == (row["solver"], row["variant"]) and o["form"] != row["form"]
         ]
         others = [3 * seconds(o) for o in within if o["owner"] == "library" and o["solver"] != row["solver"]]
         if row["stop"]:
-            assert row["time_limit_s"] >= max(10.0, min(own + others)), row["key"]
+            assert row["time_limit_s"] >= max(10.0, min(other_forms + others)), row["key"]
         else:
             assert row["time_limit_s"] == limits.time_limit(row["n"]), row["key"]
 
@@ -181,11 +181,11 @@ def test_the_same_machine(suite: str) -> None:
     machines: dict[str, set[str]] = defaultdict(set)
     for row in rows_of(suite):
         machines[row["scene"]].add(row["machine"])
-    assert {len(each) for each in machines.values()} == {1}
+    assert {len(at) for at in machines.values()} == {1}
     times: dict[str, list[datetime]] = defaultdict(list)
     for row in rows:
         times[row["scene"]].append(datetime.fromisoformat(row["recorded_at"]))
-    spans = sorted((min(each), max(each)) for each in times.values())
+    spans = sorted((min(at), max(at)) for at in times.values())
     assert all(end <= start for (_, end), (start, _) in pairwise(spans))
 
 
