@@ -96,7 +96,7 @@ class SolverSession:
         """Set up and solve."""
         self.units = self.units.of_loads([load])
         with self._step("setup_s"):
-            scaled = self.units.load(load), self.units.tolerance(self.tolerance)
+            scaled = self.units.load(load), self.tolerance / self.units.length
             self.ready = self.solver.setup(self.state, *scaled)
         return self._solve(*scaled)
 
@@ -104,7 +104,7 @@ class SolverSession:
         """Update for the next load case, and solve."""
         self.units = self.units.followed_by(load)
         with self._step("setup_s"):
-            scaled = self.units.load(load), self.units.tolerance(self.tolerance)
+            scaled = self.units.load(load), self.tolerance / self.units.length
             near = WarmStart(self.units.load(start.load), *self.units.start(start.lam, start.gap, start.x))
             self.ready = self.solver.update(self.state, self.ready, *scaled, near)
         return self._solve(*scaled)
@@ -158,7 +158,7 @@ class SolverSession:
     def _in_units(self, batch: Batch) -> Batch:
         def scaled(loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
             units = self.units.of_loads(loads)
-            answers = batch([units.load(load) for load in loads], units.tolerance(tolerance))
+            answers = batch([units.load(load) for load in loads], tolerance / units.length)
             return [_in_own_units(answer, units) for answer in answers]
 
         return scaled

@@ -10,10 +10,8 @@ FORMS: tuple[Form, ...] = get_args(Form)
 #: The forms whose matrices are dense: what a solver takes that says nothing else.
 DENSE_FORMS: tuple[Form, ...] = ("primal", "dual")
 
-FormFamily = Literal["condensed", "sparse"]
 
-
-def form_family(form: Form) -> FormFamily:
+def form_family(form: Form) -> Literal["condensed", "sparse"]:
     """How the matrices of a form are made: condensed onto the junction, or taken as they are."""
     return "condensed" if form in DENSE_FORMS else "sparse"
 

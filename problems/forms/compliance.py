@@ -4,7 +4,6 @@ narrow band, from Q itself or from local blocks of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -15,11 +14,8 @@ from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.dense_block import product
 from problems.stiffness.operator import Stiffness
 
-from .assembly import Assembly, Indices, Matrix, Vector
+from .assembly import Assembly, Matrix, Vector
 from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, banded_inverse, of_windows
-
-#: A window of contacts → its principal submatrix of Q, stored by columns, which may be overwritten.
-Local = Callable[[Indices], Matrix]
 
 
 @dataclass(frozen=True)
@@ -33,16 +29,6 @@ class ComplianceProducts:
         """Q λ, λ (m,) or (m, k)."""
         product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
         return product
-
-    def toarray(self) -> Matrix:
-        """The matrix, by columns."""
-        return self.K.compliance(self.A)
-
-    def local(self, windows: Sequence[Indices], single: bool) -> Local | None:
-        """Principal submatrices of windows of contacts near each other, in single precision to about four
-        digits; None where they cost too much.
-        """
-        return self.K.local_compliance(self.A, windows, single)
 
 
 @dataclass(frozen=True)
@@ -93,9 +79,9 @@ def of_dense(Q: DenseCompliance, nodes: Matrix | None) -> ApproximateInverse:
     return ApproximateInverse(banded_inverse(Q.Q, Windows(np.arange(m), m)), diagonal)
 
 
-def of_products(assembly: Assembly, Q: ComplianceProducts, like: ComplianceProducts) -> ApproximateInverse:
-    """M from local blocks of `like`, a Q of the same contacts: in single precision, or in double where some
-    block is not positive definite in that. For few contacts without coordinates M is Q⁻¹.
+def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
+    """M from local blocks of the Q of `like`, which has the same contacts: in single precision, or in double
+    where some block is not positive definite in that. For few contacts without coordinates M is Q⁻¹.
 
     There is no M where K has no band, where e ← e − MQe converges slowly, and for many contacts all over an
     area, where M takes longer than some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises
@@ -104,14 +90,14 @@ def of_products(assembly: Assembly, Q: ComplianceProducts, like: ComplianceProdu
     m, windows = assembly.m, _along_bands(assembly)
     few = m <= FEW
     if few and assembly.contact_nodes is None:
-        return of_dense(DenseCompliance(Q.toarray()), None)
+        return of_dense(DenseCompliance(assembly.K.compliance(assembly.A)), None)
     inverse = None
     if few or windows.work <= SETS * assembly.K.factorisation_flops:
         if _single_might_do(assembly):
             with suppress(np.linalg.LinAlgError):
                 inverse = _from_windows(like, windows, single=True)
         inverse = inverse or _from_windows(like, windows, single=False)
-    if inverse and inverse.M and _contracts(inverse.M, Q):
+    if inverse and inverse.M and _contracts(inverse.M, ComplianceProducts(assembly.K, assembly.A)):
         return inverse
     return ApproximateInverse(None, assembly.A.power(2).T @ (1 / assembly.K.diagonal))
 
@@ -125,8 +111,8 @@ def _contracts(M: BandedInverse, Q: Compliance) -> bool:
     return sizes[-1] <= CONTRACTION * sizes[-2]
 
 
-def _from_windows(Q: ComplianceProducts, windows: Windows, single: bool) -> ApproximateInverse | None:
-    local = Q.local(windows.contacts(), single)
+def _from_windows(like: Assembly, windows: Windows, single: bool) -> ApproximateInverse | None:
+    local = like.K.local_compliance(like.A, windows.contacts(), single)
     if local is None:
         return None
     diagonal = np.empty(len(windows.order))

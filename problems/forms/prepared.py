@@ -122,11 +122,9 @@ class Prepared:
     @cached_property
     def approximate_inverse(self) -> ApproximateInverse:
         """M ≈ Q⁻¹, and an estimate of the diagonal of Q. Raises LinAlgError if Q is not positive definite."""
-        K, A = self.assembly.K, self.assembly.A
-        if K.dense:
+        if self.assembly.K.dense:
             return of_dense(DenseCompliance(self.Q), self.assembly.contact_nodes)
-        like = self.coarser() if self.coarser else self.assembly
-        return of_products(self.assembly, ComplianceProducts(K, A), ComplianceProducts(like.K, like.A))
+        return of_products(self.assembly, self.coarser() if self.coarser else self.assembly)
 
     def scaled(self, D: Vector, R: Vector) -> Prepared:
         """The same problem with DKD, solved by K's factors, and DAR, for powers of two D (n,) and R (m,)."""

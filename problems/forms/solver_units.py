@@ -93,10 +93,6 @@ class Units:
         """Whether these are the units of the problem itself."""
         return bool(self.U == 1 and (self.D == 1).all() and (self.R == 1).all())
 
-    def tolerance(self, tolerance: float) -> float:
-        """τ/ℓ."""
-        return tolerance / self.length
-
     def load(self, load: LoadCase) -> LoadCase:
         """The load case in these units."""
         if self.unchanged:
