@@ -3,12 +3,10 @@
 Stops when both residuals, as 2-norms divided by max(1, norms of data and iterates), and the absolute
 duality gap are below the tolerance; the relative gap test is off. `AlmostSolved` is not solved.
 
-In the dual form, Q has eigenvalues down to 1e-5 mm/N, and the objective is about 1e8 N·mm, with a rounding
-error of 1e-8. Clarabel's equilibration and its regularisation of 1e-8 then cost accuracy (at n = 4386 it
-fails, or ends as `AlmostSolved` with an error of about 1e-5 mm). Without the former, and with 1e-12 for the
-latter, it ends as `Solved` within 1e-10 mm on three such problems; on seven smaller ones the largest error
-was 8e-8 mm. On a scene drawn at random it takes 1.2 times as long with the former, and with both it ended
-at no tolerance that sufficed. The primal and the sparse form keep the defaults (docs/libraries.md).
+In the dual form, Q has eigenvalues down to 1e-5 mm/N, and the objective is about 1e8 N·mm with a rounding
+error of 1e-8. At n = 4386, equilibration and a regularisation of 1e-8 then end in a failure or an error of
+about 1e-5 mm; without the former and with 1e-12 for the latter, three such problems end within 1e-10 mm. The
+primal and the sparse form keep the defaults (docs/libraries.md).
 """
 
 from typing import Any, ClassVar
