@@ -46,29 +46,29 @@ class Problem:
 
     @property
     def Q(self) -> Matrix:
-        """Q = AᵀK⁻¹A, (m, m), mm/N; computed when first needed."""
+        """Q = AᵀK⁻¹A, (m, m) mm/N, by columns; computed when first needed."""
         return self.prepared.Q
 
     @property
     def blocks(self) -> tuple[Any, ...]:
-        """The diagonal blocks of P, dense or sparse."""
+        """The diagonal blocks of P: those of K, N/mm, dense or csc_arrays; in the dual form Q, mm/N."""
         return self.assembly.K.matrices
 
     @property
     def G(self) -> sp.csr_array | None:
-        """The matrix of Gz ≤ h; None if bounds replace it."""
+        """The matrix of Gz ≤ h, Aᵀ (m, n); None if bounds replace it."""
         return sp.csr_array(self.assembly.A.T)
 
     def q(self, load: LoadCase) -> Vector:
-        """The linear term."""
+        """The linear term: −f (n,) in N; in the dual form −p (m,) in mm."""
         return -load.f
 
     def h(self, load: LoadCase) -> Vector | None:
-        """The right-hand side of Gz ≤ h; None if bounds replace it."""
+        """The right-hand side of Gz ≤ h, g (m,) in mm; None if bounds replace it."""
         return load.g
 
     def loads(self, cases: Sequence[LoadCase]) -> Sequence[LoadCase]:
-        """The load cases with what this form adds to them, read-only."""
+        """The load cases as a solver gets them: read-only, in the dual form with p."""
         return [read_only(case) for case in cases]
 
     def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
@@ -76,7 +76,7 @@ class Problem:
         return multipliers, z
 
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector | None, Vector]:
-        """(z, multipliers) of a warm start from forces λ, gaps g − Aᵀx and displacements x."""
+        """(z, multipliers) to start from, of an answer's forces λ, gaps g − Aᵀx and displacements x."""
         return x, lam
 
     def gap(self, load: LoadCase, lam: Vector, x: Vector | None) -> Vector:
@@ -143,7 +143,6 @@ class Dual(Problem):
         return self.prepared.with_p([load])[0].p
 
     def loads(self, cases: Sequence[LoadCase]) -> Sequence[DualLoadCase]:
-        """The load cases with p."""
         return [read_only(case) for case in self.prepared.with_p(cases)]
 
     def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
