@@ -12,6 +12,7 @@ from rich.console import Console
 
 from harness.results import records, series_file
 from harness.results.records import Row
+from harness.verification.gate import gate, show
 from problems.errors import InputError
 
 
@@ -20,6 +21,11 @@ def said_by(call: Any, *arguments: Any) -> tuple[int, str]:
     shown = StringIO()
     code = call(*arguments, Console(file=shown, width=200))
     return code, shown.getvalue()
+
+
+def gated(directory: Path) -> tuple[int, str]:
+    """The exit code of the gate, and what its command shows."""
+    return said_by(lambda console: show(gate(directory), console))
 
 
 def rows_of(directory: Path) -> list[Row]:

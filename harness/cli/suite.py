@@ -161,7 +161,7 @@ def gate(
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.verification.gate import gate as judge_again
-        from harness.verification.gate import table
+        from harness.verification.gate import show
 
         outcome = judge_again(
             directory,
@@ -171,9 +171,4 @@ def gate(
             json_file=json,
             junit_file=junit,
         )
-        first, *others = outcome.sentences
-        console.print(table(outcome.findings))
-        console.print(first, style="green" if outcome.passed else "red")
-        for sentence in others:
-            console.print(sentence)
-        raise typer.Exit(outcome.code)
+        raise typer.Exit(show(outcome, console))

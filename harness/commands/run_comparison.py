@@ -86,10 +86,10 @@ def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float 
     if not timed and max_slowdown is not None:
         allowed = f"times of one machine: {'; '.join(sorted(old.machines | new.machines))}"
         raise Incomparable.one(new.name, "--max-slowdown", max_slowdown, allowed)
-    before, after = (
+    old_rows, new_rows = (
         of_records([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)
     )
-    table = compared(before, after, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
+    table = compared(old_rows, new_rows, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
     names = quoted(old.name), quoted(new.name)
-    both = pd.concat([rows.assign(side=side) for rows, side in zip((before, after), names, strict=True)])
+    both = pd.concat([rows.assign(side=side) for rows, side in zip((old_rows, new_rows), names, strict=True)])
     return Comparison(*names, table, untimed, both)

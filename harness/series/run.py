@@ -1,4 +1,4 @@
-"""Runs a series: solves the cases that DIRECTORY lacks, writes rows and gaps as they come in.
+"""Solves the cases of a series that DIRECTORY lacks, and writes rows and gaps as they come in.
 
 The same command resumes the series that a directory holds; another series is refused.
 """
@@ -57,7 +57,7 @@ def run(
 def solve_remaining(
     job: Job, count: int, results: Iterator[list[Result]], directory: Path, console: Console
 ) -> None:
-    """Write the results; only this process does."""
+    """Write the results as they come; no other process writes."""
     record_contacts(job, directory)
     begun, made = time.monotonic(), 0
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
@@ -81,7 +81,7 @@ def print_failures(results: list[Result], console: Console) -> None:
 
 
 def identity(job: Job) -> dict[str, Any]:
-    """What must be the same for rows to belong to one series."""
+    """The facts that all rows of one series share."""
     return {
         "scene_key": job.scene.key,
         "cases_key": job.cases.key,
@@ -129,7 +129,7 @@ def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]
 
 
 def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
-    """(count,) which cases have a row.
+    """Tell which cases have a row, (count,).
 
     Raises InputError if one has other parameters than its case now, as after a change of a table.
     """
@@ -148,9 +148,9 @@ def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
     return done
 
 
-def summary(rows: Iterable[Row], asked: int, console: Console) -> int:
-    """Say how many rows there are of each verdict, the largest bound, and the largest error of those compared
-    with the reference; returns the exit code.
+def summary(rows: Iterable[Row], cases: int, console: Console) -> int:
+    """Print the number of rows of each verdict, the largest proven bound, and the largest error of the cases
+    compared with the reference; returns the exit code. cases : how many rows there should be.
     """
     counts = dict.fromkeys(VERDICTS, 0)
     worst_bound, compared, worst_error = 0.0, 0, 0.0
@@ -165,9 +165,9 @@ def summary(rows: Iterable[Row], asked: int, console: Console) -> int:
     said = f"largest proven error bound {worst_bound:.1e} mm" if proven else f"some bounds {UNPROVEN}"
     said += f", largest of {compared} checked {worst_error:.1e} mm" if compared else ""
     console.print(f"{', '.join(seen)}; {said}")
-    if missing := asked - sum(counts.values()):
+    if missing := cases - sum(counts.values()):
         console.print(f"Not solved: {missing}. Run the same command again.", style="red")
         return FAILED
     if counts["outside"] + counts["no_answer"] and counts["within"] + counts["outside"]:
         return FAILED
-    return DONE if counts["within"] == asked else NOTHING_JUDGED
+    return DONE if counts["within"] == cases else NOTHING_JUDGED

@@ -1,4 +1,6 @@
-"""A series in one process: the assembly open, the solver prepared, answers kept for warm starts."""
+"""Solves the cases of a series in one process: opens the assembly and prepares the solver once, and starts
+each case from the nearest of the answers so far.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,7 @@ Report = Callable[..., None]
 
 @dataclass(frozen=True)
 class Job:
-    """What a series solves, and how.
+    """The cases of a series, and how they are solved.
 
     check : every check-th case is compared with the reference; 0: none. threads : None: as they are.
     time_limit_s : per case, and memory_limit_mib, over all its processes: of a plug-in (places.py).
@@ -161,20 +163,21 @@ class SeriesSession(Reporter):
     def _results(self, attempts: list[Attempt]) -> list[Result]:
         """The rows and gaps, with a proven error bound for each answer."""
         start = time.perf_counter()
-        known = self._assessed(attempts)
+        assessed = self._assessed(attempts)
         share = (time.perf_counter() - start) / len(attempts)
-        return [self._result(each, known.get(each.case), share) for each in attempts]
+        return [self._result(attempt, assessed.get(attempt.case), share) for attempt in attempts]
 
     def _assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
         self.report(phase="judging")
         needs = self.problem.needs
-        answered = [each for each in attempts if all(getattr(each.answer, v) is not None for v in needs)]
+        answered = [one for one in attempts if all(getattr(one.answer, name) is not None for name in needs)]
         if not answered:
             return {}
-        lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
-        own = [each.answer.x if "x" in needs else None for each in answered]
-        found = assess(self.proof, [each.load for each in answered], lams, own, ENOUGH * self.job.limit_mm)
-        return {each.case: assessment for each, assessment in zip(answered, found, strict=True)}
+        lams = [np.asarray(attempt.answer.lam, dtype=float) for attempt in answered]
+        xs = [attempt.answer.x if "x" in needs else None for attempt in answered]
+        loads = [attempt.load for attempt in answered]
+        assessments = assess(self.proof, loads, lams, xs, ENOUGH * self.job.limit_mm)
+        return {attempt.case: made for attempt, made in zip(answered, assessments, strict=True)}
 
     def _result(self, attempt: Attempt, assessment: Assessment | None, assess_s: float) -> Result:
         answer, job = attempt.answer, self.job

@@ -10,6 +10,7 @@ from math import inf
 from pathlib import Path
 
 from pydantic import ValidationError
+from rich.console import Console
 from rich.table import Table
 
 from harness.planning.plan import expand
@@ -146,6 +147,16 @@ def concluded(findings: list[Finding], baseline: Baseline | None) -> tuple[int, 
         return DONE, (passed,)
     times = f"none exceeds its error there {baseline.margin:g} times"
     return DONE, (passed, f"{compared} of them are in {baseline.name}: {times}.")
+
+
+def show(outcome: GateOutcome, console: Console) -> int:
+    """Print the findings and the outcome; returns the exit code."""
+    console.print(table(outcome.findings))
+    first, *others = outcome.sentences
+    console.print(first, style="green" if outcome.passed else "red")
+    for sentence in others:
+        console.print(sentence)
+    return outcome.code
 
 
 def gated_rows(path: Path) -> dict[str, Row]:

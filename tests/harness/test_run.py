@@ -16,14 +16,13 @@ import psutil
 import pytest
 import tiny_joint
 from commands import harness
-from suite_runs import heed_interrupts, moved, rows_of, said_by, wait_for
+from suite_runs import gated, heed_interrupts, moved, rows_of, said_by, wait_for
 
 from harness.measurement.suite_run import run
 from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite
 from harness.results import records
 from harness.results.answer_files import pack
-from harness.verification.gate import gate
 
 pytestmark = pytest.mark.slow
 
@@ -122,31 +121,31 @@ def test_gate_believes_the_answers_and_not_the_rows(copy: Path) -> None:
     for row in rows:
         row.update(verdict="outside", displacement_error_mm=1.0, reference_bound_mm=1.0)
     records.rewrite(copy / records.MEASUREMENTS, rows)
-    assert said_by(gate, copy)[0] == 0
+    assert gated(copy)[0] == 0
     for row in rows:
         row.update(verdict="within", displacement_error_mm=0.0, limit_mm=1.0)
     records.rewrite(copy / records.MEASUREMENTS, rows)
     moved(copy / rows[2]["answer"], 2e-7)
-    code, text = said_by(gate, copy)
+    code, text = gated(copy)
     assert code == 1
     assert "2.000e-07 mm from the reference" in text
 
 
 def test_gate_reads_the_answers_of_an_archive(copy: Path) -> None:
-    judged = said_by(gate, copy)
+    judged = gated(copy)
     moved(copy / rows_of(copy)[2]["answer"], 2e-7)
-    spoilt = said_by(gate, copy)
+    spoilt = gated(copy)
     pack(copy)
     assert not (copy / "answers").exists()
     assert judged[0] == 0
-    assert said_by(gate, copy) == spoilt
+    assert gated(copy) == spoilt
     assert spoilt[0] == 1
     archive = copy / "answers.zip"
     whole = archive.read_bytes()
     archive.write_bytes(whole[:60] + bytes(40) + whole[100:])  # in the first member
-    assert "damaged" in said_by(gate, copy)[1]
+    assert "damaged" in gated(copy)[1]
     archive.write_bytes(whole[:-30])
-    assert said_by(gate, copy)[0] == 3
+    assert gated(copy)[0] == 3
 
 
 def test_gate_passes_within_the_limit_and_ignores_what_is_not_gated(copy: Path) -> None:
@@ -154,7 +153,7 @@ def test_gate_passes_within_the_limit_and_ignores_what_is_not_gated(copy: Path) 
     moved(copy / rows[2]["answer"], 0.5e-7)
     (free,) = [row for row in rows if row["answer"] and not row["gated"]]
     moved(copy / free["answer"], 1.0)
-    code, text = said_by(gate, copy)
+    code, text = gated(copy)
     assert code == 0
     assert "all 2 gated rows" in text
 
@@ -177,7 +176,7 @@ def other(**arrays: Any) -> Callable[[Path], Any]:
 )
 def test_gate_takes_a_damaged_answer_for_none(copy: Path, harm: Callable[[Path], Any]) -> None:
     harm(copy / rows_of(copy)[2]["answer"])
-    code, text = said_by(gate, copy)
+    code, text = gated(copy)
     assert code == 1
     assert "missing, damaged or not finite" in text
 
@@ -196,7 +195,7 @@ def test_gate_takes_a_missing_answer_for_lost_accuracy(copy: Path, harm: str) ->
         case "no_suite":
             (copy / "suite.toml").unlink()
     records.rewrite(copy / records.MEASUREMENTS, rows)
-    code, text = said_by(gate, copy)
+    code, text = gated(copy)
     assert code == 1
     assert harm != "no_suite" or "suite.toml" in text
 
@@ -207,7 +206,7 @@ def test_gate_with_nothing_to_judge(copy: Path, rows_kept: str) -> None:
     for row in rows:
         row.update({"answer": None} if rows_kept == "all_failed" else {"gated": False})
     records.rewrite(copy / records.MEASUREMENTS, rows)
-    code, text = said_by(gate, copy)
+    code, text = gated(copy)
     assert code == 3
     assert "Nothing could be judged" in text
 

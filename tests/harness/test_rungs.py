@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from suite_runs import moved, rows_of, said_by
+from suite_runs import gated, moved, rows_of, said_by
 
 from harness.measurement.suite_run import run
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import expand
 from harness.planning.suite import Suite, read_suite
 from harness.results import records
-from harness.verification.gate import gate
 from problems.errors import InputError
 
 WIDE, REFUSED = "hard/conditioning/1e+10", "hard/duplicates/copies"
@@ -58,7 +57,7 @@ def test_the_gate_makes_out_the_limit_itself(
     copy = Path(shutil.copytree(directory, tmp_path / "copy"))
     (row,) = rows_of(copy)
     moved(copy / row["answer"], share * row["limit_mm"], 5)
-    found, said = said_by(gate, copy)
+    found, said = gated(copy)
     assert found == code
     assert ("within their limits" in said) == (code == 0)
 

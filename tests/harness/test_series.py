@@ -13,13 +13,12 @@ import pytest
 import tiny_joint
 from small_problems import solve_by_nnls
 from strip_scene import write_strip
-from suite_runs import rows_of, said_by
+from suite_runs import gated, rows_of, said_by
 
 from harness.measurement.suite_run import run
 from harness.planning.suite import read_suite
 from harness.results import records
 from harness.results.records import Row
-from harness.verification.gate import gate
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import Vector
@@ -120,7 +119,7 @@ def test_each_case_has_a_row_and_an_answer_of_its_own(two: Path) -> None:
     assert len({row["answer"] for row in rows}) == 8
     # once an assembly, so the same in each row of a process
     assert len({row["prepare_s"] for row in rows if row["solver"] == "newton"}) == 1
-    assert said_by(gate, two)[0] == 0
+    assert gated(two)[0] == 0
 
 
 def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:

@@ -21,13 +21,16 @@ FUNCTIONS = [name for name in api.__all__ if inspect.isfunction(getattr(api, nam
 
 
 def members() -> list[str]:
-    """The classes of the reference, and their members that it names."""
+    """The classes and methods of the reference, and the members of classes that it names."""
     blocks = re.findall(r"^\.\. autoclass:: (\S+)\n(?: +:members: (.+)\n)?", REFERENCE, re.MULTILINE)
-    return [each for name, some in blocks for each in (name, *(f"{name}.{m}" for m in some.split(", ") if m))]
+    methods = re.findall(r"^\.\. automethod:: (\S+)$", REFERENCE, re.MULTILINE)
+    return methods + [
+        each for name, some in blocks for each in (name, *(f"{name}.{m}" for m in some.split(", ") if m))
+    ]
 
 
 def test_the_reference_has_every_name() -> None:
-    listed = set(re.findall(r"^\.\. auto\w+:: harness\.api\.(\w+)$", REFERENCE, re.MULTILINE))
+    listed = set(re.findall(r"^\.\. auto(?:class|function):: harness\.api\.(\w+)$", REFERENCE, re.MULTILINE))
     assert listed == set(api.__all__)
 
 
