@@ -7,7 +7,8 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import Positive
-from problems.model.interface import AnyJoint, Pair
+from problems.model.interface import AnyJoint
+from problems.model.joint import Pair
 from problems.model.junction_terms import pressing_forces, sides
 from problems.model.positions import Positions
 

@@ -9,8 +9,8 @@ import numpy as np
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import Finite, Positive, Seed
 from problems.model.effect import ContactEffect, Effect, GapEffect
-from problems.model.interface import AnyJoint, Pair
-from problems.model.joint import Faults, Table
+from problems.model.interface import AnyJoint
+from problems.model.joint import Faults, Pair, Table
 from problems.model.junction_terms import at_contacts
 
 #: How far L² may be from a correlation matrix, as a share of its largest eigenvalue; see `square_root`.

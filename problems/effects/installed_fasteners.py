@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import Effect, SpringEffect
-from problems.model.interface import AnyJoint, Pair, across
-from problems.model.joint import TOOL, Faults
+from problems.model.interface import AnyJoint, across
+from problems.model.joint import TOOL, Faults, Pair
 from problems.model.junction_terms import sides
 from problems.model.positions import Positions
 

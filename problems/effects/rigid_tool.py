@@ -8,8 +8,8 @@ import numpy as np
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import Finite
 from problems.model.effect import Effect, GapEffect, PartEffect
-from problems.model.interface import AnyJoint, Pair
-from problems.model.joint import TOOL, Faults
+from problems.model.interface import AnyJoint
+from problems.model.joint import TOOL, Faults, Pair
 from problems.model.junction_terms import at_contacts
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import ContactEffect, Effect, GapEffect
-from problems.model.interface import AnyJoint, Pair
-from problems.model.joint import Faults
+from problems.model.interface import AnyJoint
+from problems.model.joint import Faults, Pair
 from problems.model.junction_terms import at_contacts
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 import warnings
 from pathlib import Path
@@ -18,6 +19,8 @@ from problems.input.text_files import WIDE, read_bytes
 OF_PROBLEM = {"F": "f", "G": "g"}
 SYMMETRIC = 6  # form, of which some programs write one triangle
 GZIP = b"\x1f\x8b"
+HEADER = re.compile(r"(.{24,}?\d[ED])(\d+)(\.\d+.*)", re.IGNORECASE)  # of a matrix: the width of its numbers
+WITHOUT_LETTER = re.compile(r"(\d\.?)([-+]\d+)$")
 
 
 def pyyeti(path: Path) -> Any:
@@ -49,21 +52,15 @@ def read_op4(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | No
         name = OF_PROBLEM.get(written, written)
         if form == SYMMETRIC and one_sided(sp.csr_array(M)):
             M = mirrored(sp.csr_array(M))
-        if name in by_name and not _equal(M, by_name[name]):
-            allowed = (
-                f"another {written} is before it, with other entries: each matrix needs a name to itself"
-            )
+        first = by_name.setdefault(name, M)
+        if M.shape != first.shape or sp.coo_array(M - first).count_nonzero():
+            allowed = f"another {written} is before it, with other entries: each matrix needs its own name"
             raise InputError.one(path, f"matrix {at + 1} of {len(names)}", written, allowed)
-        by_name.setdefault(name, M)
     return {name: (by_name[name], None) for name in choose(list(by_name))}
 
 
-def _equal(M: Any, other: Any) -> bool:
-    return M.shape == other.shape and sp.coo_array(M - other).count_nonzero() == 0
-
-
 def _plain(path: Path, folder: Path) -> Path:
-    """A path that pyyeti reads: the binary file itself, or a copy of a text as `read_bytes` has it."""
+    """A path that pyyeti reads: the binary file itself, or a copy of a text with E before each exponent."""
     with path.open("rb") as file:
         start = file.read(4)
     if start.count(0) > 2 and not start.startswith((GZIP, *WIDE)):  # two: UTF-16 without a mark
@@ -71,6 +68,14 @@ def _plain(path: Path, folder: Path) -> Path:
     content = read_bytes(path, "file", MIB)
     if 0 in content[:4]:
         raise InputError.one(path, "file", "compressed binary", "binary OUTPUT4 not compressed: gunzip it")
-    copy = folder / "text.op4"
-    copy.write_bytes(content)
+    copy, width, lines = folder / "text.op4", 0, []
+    for line in content.decode("latin-1").split("\n"):
+        if header := HEADER.fullmatch(line):
+            width = int(header[2])
+            line = f"{header[1]}{width + 1}{header[3]}"
+        elif width and "." in line:
+            words = [line[k : k + width].rstrip() for k in range(0, len(line.rstrip()), width)]
+            line = "".join(WITHOUT_LETTER.sub(r"\1E\2", word).rjust(width + 1) for word in words)
+        lines.append(line)
+    copy.write_text("\n".join(lines), "latin-1", newline="\n")
     return copy

@@ -33,17 +33,9 @@ from .text_files import read_text
 CSV_MIB = 100
 MAX_FAULTS = 10  # reported one by one; the rest are counted
 NO_UNIT = {"": Fraction(1), "-": Fraction(1)}
-LENGTHS = NO_UNIT | {
-    unit: Fraction(mm)
-    for names, mm in {
-        "mm": "1",
-        "m": "1000",
-        "um \u03bcm": "0.001",
-        'in inch "': "25.4",
-        "ft": "304.8",
-    }.items()
-    for unit in names.split()
-}
+LENGTHS = NO_UNIT | {"mm": Fraction(1), "m": Fraction(1000), "ft": Fraction("304.8")}
+LENGTHS |= dict.fromkeys(("um", "\u03bcm"), Fraction("0.001"))
+LENGTHS |= dict.fromkeys(("in", "inch", '"'), Fraction("25.4"))
 #: The units of columns that are no lengths, by name.
 UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT)
 BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))

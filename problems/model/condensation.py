@@ -26,10 +26,7 @@ from problems.stiffness.dense_block import mirrored
 from problems.storage import fingerprint
 
 from .banded_numbering import lines_across
-from .part import PartLoadEffect, PartModel
-
-#: The folders whose code makes a part's stiffness.
-CODE = ("problems/model", "problems/effects")
+from .part import CODE, PartLoadEffect, PartModel
 
 
 def condense(

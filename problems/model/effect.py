@@ -17,8 +17,8 @@ from pydantic import Field, PrivateAttr
 
 from problems.forms.assembly import Matrix, Vector
 
-from .interface import AnyJoint, Pair
-from .joint import Faults, Table
+from .interface import AnyJoint
+from .joint import Faults, Pair, Table
 from .plate import Plate, Range
 
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.

@@ -23,18 +23,13 @@ from .joint import Faults
 
 #: The keys that say how the CSV of the key `file` is read, and their defaults.
 FILE_KEYS: dict[str, Any] = {"columns": {}, "skip_lines": 0, "missing": []}
-#: Effects that a user may look for, and the assumption of the model that excludes each.
+#: Effects that a user may look for, by the assumption of the model that excludes them.
 EXCLUDED = {
-    "friction": "assumption 4: friction between the parts is neglected",
-    "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
-    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
-    "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
-    "large_rotation": "assumption 5: linear elasticity, so displacements and rotations are small",
-    "plasticity": "assumption 5: linear elasticity",
-    "creep": "assumption 5: linear elasticity",
-    "dynamics": "the answer is the minimum of a static energy, without inertia or time",
-    "vibration": "the answer is the minimum of a static energy, without inertia or time",
-    "impact": "the answer is the minimum of a static energy, without inertia or time",
+    "assumption 2: fasteners hold the parts tangentially, only normal displacements remain": "tangential "
+    "sliding",
+    "assumption 4: friction between the parts is neglected": "friction",
+    "assumption 5: linear elasticity": "large_displacement large_rotation plasticity creep",
+    "the answer is the minimum of a static energy, without inertia or time": "dynamics vibration impact",
 }
 
 
@@ -57,8 +52,9 @@ class EffectTable:
         kind = self.content.get("kind")
         if kind not in effect_kinds():
             allowed = unknown("effect", kind, effect_kinds())
-            for excluded in get_close_matches(str(kind).lower(), EXCLUDED, 1, 0.75):
-                allowed = f"the model excludes {excluded} ({EXCLUDED[excluded]}); {allowed}"
+            for why, names in EXCLUDED.items():
+                for name in get_close_matches(str(kind).lower(), names.split(), 1, 0.75):
+                    allowed = f"the model excludes {name} ({why}); {allowed}"
             yield Fault(str(self.where), f"effect[{self.index}].kind", kind, allowed)
             return
         effect, content = effect_class(kind), self.content

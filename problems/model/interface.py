@@ -9,10 +9,8 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
-from .joint import Faults
+from .joint import Faults, Pair
 from .plate import Plate
-
-Pair = tuple[str, str]
 
 
 class AnyJoint(Protocol):

@@ -30,11 +30,10 @@ from .banded_numbering import Numbering
 from .effect import Effect
 from .joint import Joint
 from .junction_terms import junction_load
-from .part import PartLoadEffect, PartModel, graded
+from .part import CODE, PartLoadEffect, PartModel, graded
 from .scene import JointScene
 from .springs import Springs
 
-CODE = ("problems/model", "problems/effects")
 WORTH = 0.5  # of `work`: a coarser model that needs more is not used
 
 

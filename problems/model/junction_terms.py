@@ -9,8 +9,8 @@ import numpy as np
 from problems.forms.assembly import Matrix, Vector
 
 from .effect import Effect, ForceEffect, GapEffect
-from .interface import AnyJoint, Pair
-from .joint import TOOL
+from .interface import AnyJoint
+from .joint import TOOL, Pair
 
 
 def at_contacts(values: Callable[[Pair], Vector | float], pairs: Sequence[Pair], joint: AnyJoint) -> Vector:

@@ -27,6 +27,9 @@ from .effect import ElementEffect, StiffnessEffect
 from .joint import Joint, Part
 from .plate import WHOLE, LineLoads, Plate, line_loads
 
+#: The folders whose code makes a part's stiffness.
+CODE = ("problems/model", "problems/effects")
+
 
 @dataclass(frozen=True)
 class PartModel:

@@ -136,6 +136,11 @@ class Superelement:
         """The nodes of the contact surface."""
         return np.flatnonzero(self.nodes.contact)
 
+    @cached_property
+    def contact_ids(self) -> Indices:
+        """The ids of the nodes of the contact surface."""
+        return self.nodes.ids[self.contacts]
+
     def displacements(self, direction: int) -> sp.csr_array:
         """(contact nodes, n) picks the displacements along x, y or z (0, 1, 2); 0 where K keeps none."""
         place = np.full(len(self.nodes.ids), -1)

@@ -133,12 +133,11 @@ class SuperelementJoint:
 
     @cached_property
     def pairings(self) -> dict[Pair, Pairing]:
-        def of(a: str, b: str) -> Pairing:
-            return (
-                with_tool(self.faces[a]) if b == TOOL else paired(self.faces[a], self.faces[b], self.distance)
-            )
-
-        return {pair: of(*pair) for pair in self.pairs}
+        faces, distance = self.faces, self.distance
+        return {
+            (a, b): with_tool(faces[a]) if b == TOOL else paired(faces[a], faces[b], distance)
+            for a, b in self.pairs
+        }
 
     def faults(self) -> Faults:
         """Yield the faults of the contacts; faults of files are raised when these are read."""
@@ -146,13 +145,9 @@ class SuperelementJoint:
         for part in self.parts:
             steep = part.nodes.normal[part.contacts] @ self.axes[2] < STEEP
             if steep.any():
-                ids = listed(map(str, part.nodes.ids[part.contacts[steep]]))
-                allowed = (
-                    "reversed? The normals of all parts point the same way, from the first to the second"
-                )
-                wrong.append(
-                    (f"part.{part.name}.nodes", f"normals of {steep.sum()} nodes, ids {ids}", allowed)
-                )
+                value = f"normals of {steep.sum()} nodes, ids {listed(map(str, part.contact_ids[steep]))}"
+                allowed = "reversed? All normals point the same way, from the first part to the second"
+                wrong.append((f"part.{part.name}.nodes", value, allowed))
         if not wrong:
             try:
                 _ = self.faces
@@ -161,40 +156,30 @@ class SuperelementJoint:
         yield from wrong or itertools.chain.from_iterable(map(self._wrong_pairing, self.pairs))
 
     def _wrong_pairing(self, pair: Pair) -> Faults:
-        pairing, a, name = self.pairings[pair], self._of[pair[0]], " – ".join(pair)
+        pairing, ids = self.pairings[pair], self._of[pair[0]].contact_ids
+        key = f"contacts, {' – '.join(pair)}"
         if not len(pairing.nodes):
             nothing = f"no node of {pair[0]} has a foot on {pair[1]}: {pairing.beyond} are beyond its surface"
             near = f", {len(pairing.far)} too far: {self._distances(pair)}" if pairing.far else ""
-            yield f"contacts, {name}", nothing + near, f"pairing.distance = {self.distance:g} mm or more"
+            yield key, nothing + near, f"pairing.distance = {self.distance:g} mm or more"
         if pairing.lost:
-            lost = listed(map(str, a.nodes.ids[a.contacts[list(pairing.lost)]]))
-            allowed = f"normals along which a line meets {pair[1]}"
-            yield f"contacts, {name}", f"no foot found of ids {lost}", allowed
+            lost = f"no foot found of ids {listed(map(str, ids[list(pairing.lost)]))}"
+            yield key, lost, f"normals along which a line meets {pair[1]}"
         if pairing.crossed:
-            ids = [a.nodes.ids[a.contacts[list(each)]] for each in pairing.crossed]
-            value = listed(" and ".join(map(str, each)) for each in ids)
-            yield (
-                f"contacts, {name}",
-                f"ids {value}",
-                "neighbours whose feet are neighbours the same way round",
-            )
+            crossed = listed(" and ".join(map(str, ids[list(corners)])) for corners in pairing.crossed)
+            yield key, f"ids {crossed}", "neighbours whose feet are neighbours the same way round"
 
     def _distances(self, pair: Pair) -> str:
-        a, far = self._of[pair[0]], self.pairings[pair].far
-        return listed(f"{a.nodes.ids[a.contacts[k]]} ({t:.3g} mm)" for k, t in far.items())
+        ids, far = self._of[pair[0]].contact_ids, self.pairings[pair].far
+        return listed(f"{ids[k]} ({t:.3g} mm)" for k, t in far.items())
 
     def unusual(self) -> Faults:
         for part in self.parts:
-            rank = misfit(part.stiffness, part.nodes, (part.node, part.dof), part.dofs)
-            if rank:
-                yield (
-                    f"part.{part.name}, median rank by distance of the nodes that a row of K ties most",
-                    *rank,
-                )
+            if rank := misfit(part.stiffness, part.nodes, (part.node, part.dof), part.dofs):
+                what = "median rank by distance of the nodes that a row of K ties most"
+                yield f"part.{part.name}, {what}", *rank
             if len(far := outliers(part.nodes.xyz[part.contacts])):
-                usual = (
-                    f"none: is this their place? Ids {listed(map(str, part.nodes.ids[part.contacts[far]]))}"
-                )
+                usual = f"none: is this their place? Ids {listed(map(str, part.contact_ids[far]))}"
                 yield f"part.{part.name}, nodes far from all others", len(far), usual
         for pair, pairing in self.pairings.items():
             name = " – ".join(pair)
@@ -230,9 +215,9 @@ class SuperelementJoint:
 
     @property
     def ids(self) -> tuple[Indices, Indices]:
-        nodes = {part.name: part.nodes.ids[part.contacts] for part in self.parts}
-        contacts = [nodes[pair[0]][self.pairings[pair].nodes] for pair in self.pairs]
-        return np.concatenate(list(nodes.values())), np.concatenate([np.zeros(0, np.intp), *contacts])
+        contacts = [self._of[a].contact_ids[self.pairings[a, b].nodes] for a, b in self.pairs]
+        nodes = np.concatenate([part.contact_ids for part in self.parts])
+        return nodes, np.concatenate([np.zeros(0, np.intp), *contacts])
 
     def contact_name(self, index: int) -> str:
         """The pair and the node of a contact, by its place in λ."""

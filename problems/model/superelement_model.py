@@ -35,6 +35,7 @@ from .scene import JointScene
 from .springs import Springs
 from .superelement_joint import SuperelementJoint
 
+MUST_BE_HELD = "no free rigid motion: hold the part before it is reduced, or by installed_fasteners"
 HELD = 1e-9  # of the stiffest motion that springs hold: a softer one is not held
 
 
@@ -127,15 +128,11 @@ class SuperelementModel:
         loose = V[:, w <= HELD * max(w[-1], 0.0)]
         faults = []
         for k, (part, N) in enumerate(zip(joint.parts, motions, strict=True)):
-            own = loose[owner == k]
-            Q, s, _ = np.linalg.svd(own, full_matrices=False)
-            if own.size and (s > HELD).any():
-                allowed = (
-                    "no free rigid motion: hold the part before it is reduced, or by installed_fasteners"
-                )
-                faults.append(
-                    Fault(str(part.file), f"part.{part.name}", part.named(N @ Q[:, s > HELD]), allowed)
-                )
+            shares = loose[owner == k]
+            Q, s, _ = np.linalg.svd(shares, full_matrices=False)
+            if shares.size and (s > HELD).any():
+                motion = part.named(N @ Q[:, s > HELD])
+                faults.append(Fault(str(part.file), f"part.{part.name}", motion, MUST_BE_HELD))
         if faults:
             raise InputError(faults)
 

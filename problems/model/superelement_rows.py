@@ -21,6 +21,8 @@ from .node_table import Nodes, listed
 Order = Literal["table", "ids", "directions"]
 Rows = tuple[Indices, Indices]
 NORMAL_ALONE = (3,)  # dofs, if neither the file of K nor the scene says them
+ORDERS = """Say in the part how rows go through the nodes: all dofs of a node together, as in the table \
+("table") or by ascending ids ("ids"); or one of the dofs after the other, as in the table ("directions")"""
 FIRST = 7  # rows printed by validate
 SAMPLE, STRONGEST = 64, 4  # rows examined; nodes of the largest coupling per row
 BETTER, FAR = 3.0, 10  # times the rank of another order; the rank of nodes at random is half their number
@@ -59,14 +61,8 @@ def rows_of(
     ascending = bool((nodes.table == np.arange(len(nodes.ids))).all())
     if not order and not (ascending and len(dofs) == 1):
         why = "has several dofs" if ascending else "has ids that do not ascend"
-        allowed = (
-            f'"table", "ids" or "directions": this file has no labels, and {table} {why}. Say in the part '
-        )
-        allowed += (
-            'how rows go through the nodes: all dofs of a node together, as in the table ("table") or by '
-        )
-        allowed += 'ascending ids ("ids"); or one of the dofs after the other, as in the table ("directions")'
-        raise InputError.one(path, "rows", order, allowed)
+        allowed = f'"table", "ids" or "directions": this file has no labels, and {table} {why}. '
+        raise InputError.one(path, "rows", order, allowed + ORDERS)
     return by_order(order or "table", nodes, dofs)
 
 
