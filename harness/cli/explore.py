@@ -32,15 +32,8 @@ def explore(
     Exit codes: 2 wrong usage or bad input, 130 ended.
     """
     with error_reporting("", "Ended.") as console:
-        from problems.errors import InputError
-
-        try:
-            from harness.explore.page import serve
-        except ImportError as error:
-            allowed = f"needs Bokeh: pip install 'rivetbench[explore]' ({error})"
-            raise InputError.one("explore", "bokeh", "not installed", allowed) from error
-
         from harness.explore.live_answers import Explorer
+        from harness.explore.page import serve
         from harness.scene.allowed_gap import refuse_unusable
         from harness.terminal.console import ConsoleReporter
 

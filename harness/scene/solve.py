@@ -67,7 +67,7 @@ def solve_into(
     console.print(f"{record['grid']['said']}.")
     code = DONE if record["verdict"] == "within" else FAILED
     if allow_gap_mm is not None:
-        from report.page.answer import headline  # slow to import: not before the answer is shown
+        from report.page.answer_page_data import headline  # slow to import: not before the answer is shown
 
         record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
         verdict = headline(record, arrays)

@@ -127,7 +127,7 @@ def _field(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappa
     x, y, place = grid
     cells = np.empty(len(x) * len(y))
     cells[place] = values
-    return axes.pcolormesh(_edges(x), _edges(y), cells.reshape(len(y), len(x)), **look)
+    return axes.pcolormesh(cell_edges(x), cell_edges(y), cells.reshape(len(y), len(x)), **look)
 
 
 def _outlined(axes: Axes, nodes: Array, inside: NDArray[np.bool_], colour: str, label: str) -> None:
@@ -164,7 +164,7 @@ def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
     cells = np.zeros(len(x) * len(y), dtype=bool)
     cells[place] = inside
     padded = np.pad(cells.reshape(len(y), len(x)), 1)
-    xe, ye = _edges(x), _edges(y)
+    xe, ye = cell_edges(x), cell_edges(y)
     rows, columns = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])
     upright = [np.array([[xe[c], ye[r]], [xe[c], ye[r + 1]]]) for r, c in zip(rows, columns, strict=True)]
     rows, columns = np.nonzero(padded[1:, 1:-1] != padded[:-1, 1:-1])
@@ -172,7 +172,7 @@ def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
     return upright + level
 
 
-def _edges(nodes: Array) -> Array:
+def cell_edges(nodes: Array) -> Array:
     """The borders of the nodes' cells: half-way between the nodes, and the ends of the grid."""
     return np.concatenate([nodes[:1], (nodes[1:] + nodes[:-1]) / 2, nodes[-1:]])
 

@@ -12,8 +12,8 @@ from matplotlib.image import imread
 from report.document.escape import plain
 from report.document.numbers import position, significant
 from report.figures import style
-from report.page.answer import facts, headline
-from report.page.write import minute
+from report.page.answer_page_data import facts, headline
+from report.page.page_file import minute
 from report.results.answer_record import fasteners
 from report.results.series_results import Array
 

@@ -14,8 +14,8 @@ from report.document.blocks import Block, Column, Figure, Section, Table, Text, 
 from report.document.numbers import extent, significant
 from report.figures.answer_maps import answer_figures
 from report.figures.junction_maps import grid_of
-from report.page.answer import answer_data, facts, headline
-from report.page.write import write as write_page
+from report.page.answer_page_data import answer_data, facts, headline
+from report.page.page_file import write as write_page
 from report.results.answer_record import contacts, fasteners, nodes, pair_name, read
 from report.results.series_results import Array
 from report.writers.answer_pdf import write_pdf

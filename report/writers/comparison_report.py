@@ -15,8 +15,8 @@ from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
 from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import file_name
 from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
-from report.page.write import Data, banner
-from report.page.write import write as write_page
+from report.page.page_file import Data, banner
+from report.page.page_file import write as write_page
 from report.writers.sections_writer import written
 
 NOTE = (
@@ -24,13 +24,6 @@ NOTE = (
     "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
     "fewer than three are taken to vary by 15 %, or as the ratios of the other measurements do."
 )
-#: Columns of the page.
-ON_PAGE = (
-    *("measurement", "change", "verdict_old", "verdict_new", "error_mm_old", "error_mm_new", "digits_lost"),
-    *("iterations_old", "iterations_new", "seconds_old", "seconds_new", "ratio", "ratio_least", "ratio_most"),
-    *("status_old", "status_new"),
-)
-TEXTS = ("measurement", "change", "verdict", "status")
 SIDES = ("old", "new")
 
 
@@ -123,12 +116,14 @@ def _blocks(pair: Comparison, prefix: str) -> list[Block]:
 def comparison_data(comparisons: list[Comparison]) -> Data:
     """The data of the page."""
     return {
-        "kind": "compare",
         "banner": _banner(pd.concat([pair.rows for pair in comparisons])),
-        "columns": [[name, name.replace("_", " "), not name.startswith(TEXTS)] for name in ON_PAGE],
-        "comparisons": [
-            {name: getattr(pair, name) for name in ("old", "new", "summary")}
-            | {"lines": [_line(line) for line in records(pair.table)]}
+        "tables": [
+            {
+                "title": f"{pair.old} → {pair.new}",
+                "summary": pair.summary,
+                "heads": [column.heading for column in COLUMNS],
+                "lines": [[str(column.show(line)) for column in COLUMNS] for line in records(pair.table)],
+            }
             for pair in comparisons
         ],
     }
@@ -142,7 +137,3 @@ def _banner(rows: pd.DataFrame) -> Data:
         warned.append("The rows come from several machines; times are compared within one machine only.")
     code = "; ".join(f"{side}: {commits_text(of_side)}" for side, of_side in sides)
     return banner(rows, commits=code, counts=counted(len(rows), "row"), warnings=warned)
-
-
-def _line(line: dict[str, Any]) -> Data:
-    return {name: None if pd.isna(line[name]) else line[name] for name in ("group", *ON_PAGE)}

@@ -15,9 +15,10 @@ from report.document.escape import file_name
 from report.document.numbers import counted, out_of, significant, tidy_power
 from report.figures import style
 from report.figures.junction_maps import Map, drawn, rooted
-from report.page.maps import series_maps
-from report.page.write import Data, banner
-from report.page.write import write as write_page
+from report.page.contact_maps import hover_names, map_controls, series_maps
+from report.page.page_figures import as_items, exceedance_figure, map_figure
+from report.page.page_file import Data, banner
+from report.page.page_file import write as write_page
 from report.results.series_results import (
     QUANTILES,
     Array,
@@ -182,6 +183,9 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
     facts = series.facts
     versions = facts.get("versions") or {}
     identity = facts["identity"]
+    maps = series_maps(series, quantiles, names)
+    gaps = curve["gap_mm"].to_numpy()
+    curves = {text: (gaps, 100 * curve[key].to_numpy()) for key, text in CURVES.items()}
     rows = series.code.assign(
         machine=str(facts["machine"]),
         recorded_at="",
@@ -191,7 +195,6 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
     rows["clean"] = rows["clean"].astype(float)
     check = facts.get("allowed_gap")
     return {
-        "kind": "series",
         "headline": {"kind": check["kind"], "text": " ".join(check["said"][::-1])} if check else None,
         "banner": banner(
             rows,
@@ -199,14 +202,8 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
             counts=f"{out_of(len(series.cases), facts['cases'], 'load case')} answered",
             versions=[f"{name} {version}" for name, version in versions.items()],
         ),
-        "curves": [
-            {
-                "name": name,
-                "points": [
-                    [gap, 100 * share] for gap, share in zip(curve["gap_mm"], curve[key], strict=True)
-                ],
-            }
-            for key, name in CURVES.items()
-        ],
-        "maps": series_maps(series, quantiles, names),
+        "views": [("maps", "Gap maps")] if maps["maps"] else [],
+        "controls": map_controls(maps),
+        "maps": maps,
+        "figures": as_items({"map": map_figure(hover_names(maps)), "curves": exceedance_figure(curves)}),
     }

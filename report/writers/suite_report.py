@@ -12,8 +12,8 @@ from report.analysis.checks import warnings
 from report.document.blocks import Block, Section, Text
 from report.document.numbers import counted, listed
 from report.figures import style
-from report.page.run import run_data
-from report.page.write import write as write_page
+from report.page.page_file import write as write_page
+from report.page.run_page_data import run_data
 from report.results.reader import Results, read
 from report.sections import SECTIONS
 

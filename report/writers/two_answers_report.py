@@ -13,8 +13,8 @@ from report.document.blocks import Block, Column, Figure, Section, Table, Text, 
 from report.document.escape import csv_frame
 from report.document.numbers import significant, whole
 from report.figures.answer_maps import gap_maps
-from report.page.answer import two_answers_data
-from report.page.write import write as write_page
+from report.page.answer_page_data import two_answers_data
+from report.page.page_file import write as write_page
 from report.results.answer_record import Answer, contacts, fasteners, pair_name, read
 from report.results.series_results import Array
 from report.writers.sections_writer import written

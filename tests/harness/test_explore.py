@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bokeh.document import Document
 from commands import harness
 from small_joints import FASTENERS, GAP, two_parts
 
 from harness import solve
+from harness.explore import page as explore_page
 from harness.explore.live_answers import CHANGED, Explorer, Settings
 from harness.explore.raster import Raster
 from harness.scene.scene_file import edited
@@ -118,11 +120,10 @@ points = [[150.0, 25.0]]
 
 def page_of(path: Path, text: str) -> Any:
     """A page of a scene as in a browser, without one."""
-    module = pytest.importorskip("harness.explore.page")
     path.write_text(text)
     explorer, settings = Explorer(scene_of(path), "dual"), Settings.of(scene_of(path))
-    document = pytest.importorskip("bokeh.document").Document()
-    return module.Page(explorer, str(path), 0.05, explorer.answer(settings), document)
+    document = Document()
+    return explore_page.Page(explorer, str(path), 0.05, explorer.answer(settings), document)
 
 
 def dragged(page: Any, x: float, y: float) -> None:
@@ -187,7 +188,6 @@ def test_packaged_scenes_are_saved_too(name: str, tmp_path: Path) -> None:
     [("hard/duplicates/2e-05", "own matrices"), ("gallery/heavy-sheet-on-tool", "no fasteners")],
 )
 def test_scenes_without_fasteners(scene: str, said: str) -> None:
-    pytest.importorskip("bokeh")
     done = harness("explore", scene, "--no-open")
     assert done.exit_code == 2
     assert said in done.output

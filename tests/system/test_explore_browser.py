@@ -17,7 +17,6 @@ from test_page_browser import chromium  # noqa: F401
 from harness import solve
 from problems.scene_files import read_scene
 
-pytest.importorskip("bokeh")
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 SCENE = (

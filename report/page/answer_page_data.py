@@ -5,30 +5,37 @@ from __future__ import annotations
 import pandas as pd
 
 from report.document.numbers import listed, out_of, position, significant
-from report.page.write import Data, banner
+from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
+from report.page.page_figures import as_items, map_figure
+from report.page.page_file import Data, banner
 from report.results.answer_record import Answer, fasteners, pair_name
 from report.results.series_results import Array
-
-from .maps import answer_maps, two_answers_maps
 
 CODE = ("machine", "commit", "clean", "recorded_at")
 
 
 def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
-    """What the page of one answer shows. record, arrays : of solution.json and solution.npz."""
-    return {
-        "kind": "answer",
-        "banner": _banner([record]),
+    """The page of one answer. record, arrays : of solution.json and solution.npz."""
+    forces = [
+        [kind, contact, *map(significant, numbers)]
+        for kind, contact, *numbers in fasteners(record).itertuples(index=False)
+    ]
+    table = {
+        "title": "Forces in the fasteners",
+        "summary": "",
+        "heads": ["kind", "contact", "x, mm", "y, mm", "force, N"],
+        "lines": forces,
+    }
+    page = _with_maps([record], facts(record), answer_maps(record, arrays))
+    return page | {
         "headline": headline(record, arrays),
-        "fasteners": fasteners(record).to_numpy().tolist(),
-        "facts": facts(record),
-        "maps": answer_maps(record, arrays),
+        "tables": [*([table] if forces else []), *page["tables"]],
     }
 
 
 def facts(record: Data) -> list[list[str]]:
-    """How the scene was solved and judged: names and values, as answer.md has them too."""
-    known = {
+    """Names and values that tell how the scene was solved and judged; answer.md has them too."""
+    values = {
         "solved by": record["method"],
         "unknowns n": record["n"],
         "contacts m": record["m"],
@@ -43,7 +50,7 @@ def facts(record: Data) -> list[list[str]]:
     }
     return [
         [name, significant(value) if isinstance(value, float) else str(value)]
-        for name, value in known.items()
+        for name, value in values.items()
         if value is not None
     ]
 
@@ -79,12 +86,23 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
 
 
 def two_answers_data(answers: list[Answer]) -> Data:
-    """What the page of two answers on one junction shows."""
+    """The page of two answers on one junction."""
     records = [record for record, _ in answers]
     named = [f"{record['title']}, {record['method']}" for record in records]
     maps = two_answers_maps(records[0], [arrays for _, arrays in answers])
     both = [["first", named[0]], ["second", named[1]]]
-    return {"kind": "answer", "banner": _banner(records), "facts": both, "maps": maps}
+    return _with_maps(records, both, maps)
+
+
+def _with_maps(records: list[Data], lines: list[list[str]], maps: Data) -> Data:
+    return {
+        "banner": _banner(records),
+        "tables": [{"title": "Facts", "summary": "", "heads": [], "lines": lines}],
+        "views": [("maps", "Gap maps")] if maps["maps"] else [],
+        "controls": map_controls(maps),
+        "maps": maps,
+        "figures": as_items({"map": map_figure(hover_names(maps))}),
+    }
 
 
 def _banner(records: list[Data]) -> Data:

@@ -1,10 +1,11 @@
-"""Puts a page together, in one file: template, style, scripts, D3, the banner, and the data in few bytes."""
+"""Puts a page together in one file: template, style, scripts, Bokeh, the banner and the data in few bytes."""
 
 from __future__ import annotations
 
+import json
 import zlib
 from base64 import b64encode
-from importlib.metadata import distribution
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,28 +18,49 @@ from report.document.escape import plain, quoted, script_json, short
 from report.results.series_results import Array
 
 HERE = Path(__file__).parent
-SCRIPTS = ("state", "judge", "matrix", "details", "plots", "maps", "page")
-D3 = "mpld3/js/d3.v5.min.js"  # read as a file: python -OO does not import mpld3
-Data = dict[str, Any]
+SCRIPTS = ("state", "judge", "tables", "plots", "page")
+BY_TEMPLATE = ("banner", "headline", "tables", "views", "controls", "limit")
+BY_BOTH = ("styles", "figures")  # by the template and the scripts
 DIGITS = 1 << 11  # what is dropped of a float32's mantissa: 3.6 decimal digits are left
+Data = dict[str, Any]
 
 
 def write(path: Path, title: str, data: Data, directory: Path | None = None) -> Path:
     """Write the page and return its path. directory : of the rows, as the page's commands name it."""
+    from bokeh.resources import Resources
+
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined
     )
     heading = plain(short(title, 150))
-    named = data | {"title": heading, "directory": "" if directory is None else _named(directory)}
+    scripted = {name: value for name, value in data.items() if name not in BY_TEMPLATE}
+    scripted["directory"] = "" if directory is None else _named(directory)
+    static = {name: data.get(name) or {} for name in (*BY_TEMPLATE, *BY_BOTH)}
     content = {
+        **json.loads(script_json(static)),  # texts as they were: the template escapes them
         "title": heading,
         "style": (HERE / "page.css").read_text("utf-8"),
-        "data": script_json(named),
-        "d3": Path(str(distribution("mpld3").locate_file(D3))).read_text("utf-8"),
+        "data": script_json(scripted),
+        "bokeh": "\n".join(Resources(mode="inline", components=["bokeh"], minified=True).js_raw),
         "scripts": [(HERE / f"{name}.js").read_text("utf-8") for name in SCRIPTS],
     }
     path.write_text(environment.get_template("page.html.j2").render(content), "utf-8")
     return path
+
+
+def choice(name: str, label: str, options: Iterable[tuple[object, str]], views: str) -> Data:
+    """A list above some views. options : values and texts, of which the first is chosen; "" chooses all."""
+    return {
+        "name": name,
+        "label": label,
+        "options": [[str(value), text] for value, text in options],
+        "views": views,
+    }
+
+
+def entry(name: str, label: str, views: str) -> Data:
+    """A field for a number above some views."""
+    return {"name": name, "label": label, "views": views}
 
 
 def _named(directory: Path) -> str:

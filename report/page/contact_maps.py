@@ -1,0 +1,227 @@
+"""Gap maps for the page: places, gaps and forces of the contacts of scenes, answers and series.
+
+A map has `fields` by name; the `group` of its places, which maps on the same contacts share; and `marks`, the
+fasteners. A field has packed `values`, and a `kind` and a range for its colours. A group has packed arrays in
+mm: x, y, and left, right, bottom and top of each contact's cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from report.figures.junction_maps import cell_edges, grid_of
+from report.page.page_file import Data, choice, entry, exact, packed
+from report.results.answer_record import pair_name
+from report.results.reader import Results
+from report.results.series_results import Array, Series
+
+LARGEST_MAP = np.array([1100.0, 560.0])  # pixels
+BESIDE_MAP, BELOW_MAP = 165, 65  # pixels of the axes, the colours and the tools
+NO_MARKS = np.zeros((0, 2))
+BUDGET = 1_100_000  # characters of all maps of a page
+MOST = 20_000  # contacts of a map; of more, every k-th is shown
+CASES = 60  # of a series, at most
+SHARES = (1.0, 0.99, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01)
+COLOUR_ENTRIES = {"low": "from", "high": "to", "threshold": "outline above"}
+SHOWN_FIRST = ("gap after", "95 % quantile")
+FIELDS = {"gap_before": "gap before", "gap_after": "gap after", "lam": "force"}
+
+
+def scene_maps(results: Results) -> Data:
+    """The maps of a run's scenes as far as they fit, and the names of those left out."""
+    page = _empty()
+    for scene in results.cells.sort_values(["n", "active", "scene"])["scene"].unique():
+        arrays = results.scene_arrays(scene)
+        if arrays == {}:  # damaged
+            page["left_out"].append(scene)
+        elif arrays:
+            fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
+            marks = arrays.get("fasteners", NO_MARKS)
+            if not _added(page, scene, arrays["contact_nodes"], fields, marks, BUDGET):
+                page["left_out"].append(scene)
+    if page["left_out"]:
+        for made in page["maps"]:
+            made["about"] += f" Left out, too large or damaged: {', '.join(page['left_out'])}."
+    return page
+
+
+def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
+    """The maps of one answer, one per pair of parts in contact."""
+    return _pairs(record, {text: arrays[name] for name, text in FIELDS.items()}, arrays)
+
+
+def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
+    """The maps of two answers on one junction, one per pair of parts: both gaps, and what the second adds."""
+    first, second = (arrays["gap_after"] for arrays in answers)
+    fields = {"first": first, "second": second, "second − first": second - first}
+    page = _pairs(record, fields, answers[0])
+    for made in page["maps"]:
+        change = made["fields"]["second − first"]
+        most = max(-change["low"], change["high"])
+        change |= {"kind": "change", "low": -most, "high": most}
+    return page
+
+
+def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array]) -> Data:
+    page = _empty()
+    marks = np.array([point for points in record.get("marks", {}).values() for point in points])
+    for pair in record["pairs"] if "contact_nodes" in arrays else ():
+        own = slice(pair["start"], pair["stop"])
+        of_pair = {name: values[own] for name, values in fields.items()}
+        _added(page, pair_name(pair), arrays["contact_nodes"][own], of_pair, marks)
+    return page
+
+
+def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
+    """The maps of a series: the quantiles over the cases, some cases, the worst among them, and for each
+    contact the gaps that given shares of the cases exceed.
+
+    quantiles : (len(names), m), mm.
+    """
+    page = _empty()
+    if series.nodes is None or not len(series.cases):
+        return page
+    step = _step(len(series.nodes))
+    curves = _exceeded(series, step)
+    maps = dict(zip(names, quantiles, strict=True))
+    _added(page, f"{len(series.cases)} cases", series.nodes, maps, series.fasteners)
+    (made,) = page["maps"]
+    worst, *others = _chosen(series)
+    spent, cases = _size(made["fields"]) + len(curves), {}
+    for case in (worst, *others):
+        field = _field("gap", np.asarray(series.gaps[case, ::step], dtype=float)) | {"hover": False}
+        spent += len(field["values"])
+        if spent > BUDGET:
+            break
+        cases[case] = field
+    for case, field in sorted(cases.items()):
+        made["fields"][f"case {case}{', the worst' if case == worst else ''}"] = field
+    made["about"] += " A click on a contact shows how often its gap is exceeded."
+    made |= {"shares": [100 * share for share in SHARES], "exceeded": curves}
+    return page
+
+
+def _chosen(series: Series) -> Iterator[int]:
+    """The worst case, then others at equal distances."""
+    numbers = series.cases["case"].to_numpy()
+    worst = int(numbers[series.cases["max_gap_mm"].to_numpy().argmax()])
+    yield worst
+    for place in np.unique(np.linspace(0, len(numbers) - 1, CASES - 1).astype(int)):
+        if numbers[place] != worst:
+            yield int(numbers[place])
+
+
+def _exceeded(series: Series, step: int) -> str:
+    """(contacts, len(SHARES)), mm: the gap that this share of the cases exceeds."""
+    shares = 1 - np.array(SHARES)
+    return packed(np.concatenate([np.quantile(gaps, shares, axis=0).T for gaps in series.of_contacts(step)]))
+
+
+def map_controls(page: Data) -> list[Data]:
+    """The lists and numbers above the maps of a page, if it has any."""
+    if not page["maps"]:
+        return []
+    names = dict.fromkeys(name for made in page["maps"] for name in made["fields"])
+    first = next((name for name in SHOWN_FIRST if name in names), None)
+    ordered = sorted(names, key=lambda name: name != first)
+    return [
+        choice("map", "map", [(k, made["name"]) for k, made in enumerate(page["maps"])], "maps"),
+        choice("field", "show", [(name, name) for name in ordered], "maps"),
+        choice("scale", "colours", [("linear", "linear"), ("log", "logarithmic")], "maps"),
+        *(entry(name, label, "maps") for name, label in COLOUR_ENTRIES.items()),
+    ]
+
+
+def hover_names(page: Data) -> list[str]:
+    """The fields told where the pointer is on a map of the page."""
+    fields = (item for made in page["maps"] for item in made["fields"].items())
+    return list(dict.fromkeys(name for name, field in fields if field["hover"]))
+
+
+def _empty() -> Data:
+    return {"groups": [], "maps": [], "left_out": []}
+
+
+def _added(
+    page: Data, name: str, nodes: Array, fields: dict[str, Array], marks: Array, budget: float = np.inf
+) -> bool:
+    """Whether the map fitted into the page."""
+    step = _step(len(nodes))
+    place = {side: exact(values) for side, values in _cells(nodes[::step]).items()}
+    made = {text: _field(text, values[::step]) for text, values in fields.items()}
+    groups = page["groups"]
+    spent = sum(map(_letters, groups)) + sum(_size(other["fields"]) for other in page["maps"])
+    if spent + _size(made) + (0 if place in groups else _letters(place)) > budget:
+        return False
+    if place not in groups:
+        groups.append(place)
+    about = f"{len(nodes)} contacts{f', every {step}th of which is drawn' if step > 1 else ''}."
+    x, y = np.reshape(marks, (-1, 2)).T.tolist()
+    page["maps"].append(
+        {
+            "name": name,
+            "about": about + (" Circles: fasteners and clamps." if x else ""),
+            "fields": made,
+            "marks": {"x": x, "y": y},
+            "group": groups.index(place),
+            **_frame(nodes),
+        }
+    )
+    return True
+
+
+def _frame(nodes: Array) -> Data:
+    """Pixels and ranges of a map with about the same scale in x and y, and a margin."""
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    margin = 0.02 * (high - low).max() + 1e-3
+    low, high = low - margin, high + margin
+    pixels = (high - low) * (LARGEST_MAP / (high - low)).min()
+    return {
+        "frame": {"width": round(pixels[0]) + BESIDE_MAP, "height": round(pixels[1]) + BELOW_MAP},
+        "x_range": {"start": low[0], "end": high[0]},
+        "y_range": {"start": low[1], "end": high[1]},
+    }
+
+
+def _field(name: str, values: Array) -> Data:
+    """A field with the range of its colours: gaps from 0 or the least, forces from 1/10 000 of the most."""
+    high = float(np.nanmax(values, initial=0.0)) or 1.0
+    force = name == FIELDS["lam"]
+    return {
+        "kind": "force" if force else "gap",
+        "unit": "N" if force else "mm",
+        "low": 1e-4 * high if force else float(np.nanmin(values, initial=0.0)),
+        "high": high,
+        "hover": True,
+        "values": packed(values),
+    }
+
+
+def _cells(nodes: Array) -> dict[str, Array]:
+    """Places and sides of the contacts' cells, mm. Off a grid the cells are squares of the mean size."""
+    x, y = nodes.T
+    grid = grid_of(nodes)
+    if grid is None:
+        half = 0.5 * np.sqrt(max(np.ptp(x) * np.ptp(y), 1.0) / len(nodes))
+        return {"x": x, "y": y, "left": x - half, "right": x + half, "bottom": y - half, "top": y + half}
+    columns, rows, place = grid
+    row, column = np.divmod(place, len(columns))
+    across, up = cell_edges(columns), cell_edges(rows)
+    return {
+        **{"x": x, "left": across[column], "right": across[column + 1]},
+        **{"y": y, "bottom": up[row], "top": up[row + 1]},
+    }
+
+
+def _letters(group: dict[str, str]) -> int:
+    return sum(map(len, group.values()))
+
+
+def _size(fields: dict[str, Data]) -> int:
+    return sum(len(field["values"]) for field in fields.values())
+
+
+def _step(contacts: int) -> int:
+    return -(-contacts // MOST)

@@ -1,0 +1,142 @@
+"""The Bokeh figures of a page, as JSON: their looks are here, and plots.js fills in what is asked for.
+
+Bokeh is imported when a page is written: it takes a third of a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from report.results.series_results import Array
+
+if TYPE_CHECKING:
+    from bokeh.plotting import figure
+
+PANELS = 12  # scenes whose work and precision are drawn at a time
+TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
+CURVE_LOOKS = (("#0072B2", "solid"), ("#D55E00", "dashed"))
+
+
+def as_items(figures: dict[str, Any]) -> dict[str, Any]:
+    """The figures as JSON items for `Bokeh.embed.embed_item`; a list of figures becomes a list of items.
+
+    Bokeh numbers its models through the process; here they are numbered anew, so that equal data give equal
+    pages.
+    """
+    from bokeh.embed import json_item
+
+    numbers: dict[str, str] = {}
+
+    def renumbered(value: Any) -> Any:
+        match value:
+            case dict():
+                return {
+                    key: numbers.setdefault(item, f"m{len(numbers)}")
+                    if key in ("id", "root_id")
+                    else renumbered(item)
+                    for key, item in value.items()
+                }
+            case list():
+                return [renumbered(item) for item in value]
+        return value
+
+    return {
+        name: renumbered([json_item(each) for each in made] if isinstance(made, list) else json_item(made))
+        for name, made in figures.items()
+    }
+
+
+def map_figure(names: Iterable[str]) -> figure:
+    """A field on the contacts, with the fasteners, and a red outline where it is above a threshold.
+
+    A renderer and a colour bar of the same name show each kind of field on each scale; one pair is visible.
+    names : of the fields whose values are shown at the pointer.
+    """
+    from bokeh.models import ColorBar, HoverTool, LinearColorMapper, LogColorMapper, TapTool
+    from bokeh.palettes import RdBu11, interp_palette, magma, viridis
+    from bokeh.transform import transform
+
+    plot = _figure("x, mm", "y, mm", x_range=(0, 1), y_range=(0, 1))
+    palettes = {"gap": viridis(256), "force": magma(256)[::-1], "change": interp_palette(RdBu11, 256)}
+    sides = {side: side for side in ("left", "right", "bottom", "top")}
+    outline: dict[str, Any] = {"fill_color": None, "line_color": "edge", "line_width": 1.5}
+    empty: dict[str, list[float]] = {name: [] for name in ("x", "y", "value", "edge", *sides, *names)}
+    above = plot.quad(**sides, **outline, source=empty, name="above", level="annotation")
+    above.nonselection_glyph = None
+    for kind, palette in palettes.items():
+        for scale, mapper in {"linear": LinearColorMapper, "log": LogColorMapper}.items():
+            colours = mapper(palette=palette, low=0.1, high=1.0, nan_color="#dddddd")
+            if kind == "force":
+                colours.low_color = "white"  # where there is none
+            look: dict[str, Any] = dict.fromkeys(("fill_color", "line_color"), transform("value", colours))
+            name = f"{kind} {scale}"
+            cells = plot.quad(**sides, **look, source=above.data_source, name=name, visible=False)
+            cells.nonselection_glyph = None
+            plot.add_layout(ColorBar(color_mapper=colours, name=name, visible=False), "right")
+    ring: dict[str, Any] = {"size": 7, "line_color": "#ffffff", "fill_color": "#111111"}
+    plot.scatter("x", "y", source={"x": [], "y": []}, name="marks", **ring)
+    lines = [("x, mm", "@x"), ("y, mm", "@y"), ("shown", "@value{0.0000}")]
+    lines += [(name, f"@{{{name}}}{{0.0000}}") for name in names]
+    plot.add_tools(HoverTool(renderers=[above], tooltips=lines), TapTool(renderers=[above]))
+    return plot
+
+
+def exceedance_figure(curves: dict[str, tuple[Array, Array]]) -> figure:
+    """The share of each curve's gaps that exceed t, and an empty dotted line for a contact to be chosen.
+
+    curves : by name t, mm, and the share in %.
+    """
+    from bokeh.models import HoverTool
+
+    plot = _figure("gap t, mm", "share with more than t, %", width=760, height=320, y_axis_type="log")
+    for (name, (gap, share)), (colour, dash) in zip(curves.items(), CURVE_LOOKS, strict=True):
+        shown = share > 0
+        columns = {"x": gap[shown], "y": share[shown]}
+        plot.line("x", "y", source=columns, color=colour, line_dash=dash, line_width=2, legend_label=name)
+    dotted: dict[str, Any] = {"color": "#000000", "line_dash": "dotted", "line_width": 2}
+    empty: dict[str, list[float]] = {"x": [], "y": []}
+    plot.line("x", "y", source=empty, name="contact", legend_label="the contact chosen", **dotted)
+    plot.legend.location = "bottom_left"
+    lines = [("gap, mm", "@x{0.0000}"), ("share with more, %", "@y{0.000}")]
+    plot.add_tools(HoverTool(tooltips=lines, mode="vline"))
+    return plot
+
+
+def precision_figure(errors: tuple[float, float], seconds: tuple[float, float]) -> figure:
+    """Seconds against the error reached, with the limit dashed and the reference error bound grey.
+
+    errors, seconds : the ranges, mm and s.
+    """
+    from bokeh.models import BoxAnnotation, HoverTool, Span, TapTool
+
+    scales: dict[str, Any] = {
+        "x_axis_type": "log",
+        "y_axis_type": "log",
+        "x_range": errors,
+        "y_range": seconds,
+    }
+    plot = _figure("error, mm", "seconds", width=440, height=270, **scales)
+    plot.add_layout(BoxAnnotation(name="bound", fill_color="#000000", fill_alpha=0.07, line_color=None))
+    plot.add_layout(Span(name="limit", dimension="height", line_dash="dashed"))
+    columns = ("reached_mm", "seconds", "color", "face", "marker", "angle", "dash", "alpha", "about", "key")
+    empty: dict[str, list[float]] = {name: [] for name in columns}
+    look: dict[str, Any] = {"line_color": "color", "line_alpha": "alpha"}
+    plot.multi_line(
+        "reached_mm", "seconds", source=dict(empty), line_dash="dash", line_width=1.6, name="lines", **look
+    )
+    look |= {"fill_color": "face", "fill_alpha": "alpha", "angle": "angle"}
+    markers = plot.scatter(
+        "reached_mm", "seconds", source=dict(empty), marker="marker", size=9, name="cells", **look
+    )
+    plot.add_tools(HoverTool(renderers=[markers], tooltips=[("", "@about")]), TapTool(renderers=[markers]))
+    return plot
+
+
+def _figure(x: str, y: str, **more: Any) -> figure:
+    from bokeh.plotting import figure
+
+    plot = figure(x_axis_label=x, y_axis_label=y, tools=TOOLS, **more)
+    plot.toolbar.logo = None
+    plot.toolbar.autohide = True
+    return plot

@@ -1,0 +1,277 @@
+"""The rows of a results directory for the page: its cells with all that distinguishes and judges them.
+
+The page gives the verdicts itself, for any limit L, from the cell's error and reference error bound:
+
+    cannot be judged    unless bound ≤ max(L, least) / 10
+    within              if error ≤ max(L, least), else outside
+
+with `least` the limit that conditioning allows on a rung of a ladder, where it is above the one asked for. At
+the limit of the rows these are the judge's verdicts.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pandas as pd
+
+from harness.results.schema import LADDERS
+from report.analysis.checks import warnings
+from report.analysis.time_to_solution import STAGES, roads
+from report.document.blocks import records
+from report.document.numbers import listed
+from report.figures.style import line_styles
+from report.page.contact_maps import hover_names, map_controls, scene_maps
+from report.page.page_figures import PANELS, as_items, map_figure, precision_figure
+from report.page.page_file import Data, banner, choice, column
+from report.results.reader import Results
+from report.results.rows import CELL, in_order
+
+TEXTS = (
+    *("scene", "method", "label", "solver", "owner", "form", "variant", "status", "verdict", "machine"),
+    *(
+        "title",
+        "ladder",
+        "contact",
+        "message",
+        "solver_version",
+        "solver_code",
+        "commit",
+        "recorded_at",
+        "key",
+    ),
+)
+NUMBERS = (
+    *("n", "m", "active", "tolerance", "threads", "repeats", "iterations", "inner_iterations"),
+    *("load_case_s", "least_s", "most_s", "total_s", "scene_s", "peak_rss_mib", "time_limit_s"),
+    *("displacement_error_mm", "reached_mm", "bound_mm", "least_mm", "backward_error", "contact_mismatch"),
+)
+LIMIT_MM = 1e-7  # of rows that do not say
+JUDGED = "ladders matrix precision solver"  # the views with a limit and filters
+METRICS = {
+    "load_case_s": "seconds per load case",
+    "total_s": "seconds with preparation",
+    "scene_s": "seconds from the scene",
+    "over": "error / limit",
+}
+VERDICTS = {
+    "within": "within",
+    "outside": "outside the limit",
+    "cannot_be_judged": "cannot be judged",
+    "no_answer": "no answer",
+}
+FILTERS = {
+    "machine": "machine",
+    "n": "size n",
+    "contact": "contact",
+    "form": "form",
+    "threads": "threads",
+    "owner": "solvers",
+    "tolerance": "tolerance",
+    "ladder": "ladder",
+    "status": "reported",
+}
+ALL = ("", "all")
+CONTACT = {"up to 10 %": 0.1, "10 to 50 %": 0.5, "above 50 %": 1.0}
+#: By matplotlib's marker, Bokeh's of about the same shape, its turn, and a character like it.
+MARKERS = {
+    "o": ("circle", 0, "●"),
+    "s": ("square", 0, "■"),
+    "*": ("star", 0, "★"),
+    "D": ("diamond", 0, "◆"),
+    "d": ("diamond_dot", 0, "◈"),
+    "v": ("inverted_triangle", 0, "▼"),
+    "<": ("triangle", 90, "◀"),
+    ">": ("triangle", -90, "▶"),
+    "P": ("plus", 0, "✚"),
+    "X": ("plus", 45, "✖"),
+    "p": ("square_dot", 0, "▣"),
+    "h": ("hex", 0, "⬢"),
+    "H": ("hex_dot", 0, "⬣"),
+    "8": ("circle_dot", 0, "◉"),
+}
+DRAWN_MM = (1e-16, 1.0)  # errors of the view of work and precision
+#: Columns of the view of one solver, after the verdict.
+OF_ONE_SOLVER = {
+    "scene": "scene",
+    "tolerance": "tolerance",
+    "options": "options",
+    "status": "reported",
+    "displacement_error_mm": "error, mm",
+    "over": "error / limit",
+    "bound_mm": "bound, mm",
+    "iterations": "steps",
+    "load_case_s": "load case, s",
+    "least_s": "least",
+    "most_s": "most",
+    "total_s": "with preparation, s",
+    "slower": "× fastest",
+    "threads": "threads",
+    "peak_rss_mib": "peak, MiB",
+}
+
+
+def run_data(results: Results) -> Data:
+    """The rows of a results directory, with the views, lists and figures of their page."""
+    cells, scenes, maps = _cells(results), _scenes(results), scene_maps(results)
+    asked = cells["limit_asked_mm"].dropna()
+    ladders = any(scene["ladder"] for scene in scenes)
+    method_of = dict(zip(cells["label"], cells["method"], strict=True))
+    methods = list(dict.fromkeys(method_of[label] for label in (in_order(cells) if len(cells) else [])))
+    filters = _filters(cells)
+    views = {
+        "matrix": "Matrix",
+        "precision": "Work and precision",
+        "solver": "One solver",
+        "maps": "Gap maps",
+    }
+    if ladders:
+        views = {"ladders": "Ladders"} | views
+    if not maps["maps"]:
+        del views["maps"]
+    if not methods:
+        del views["solver"]
+    ranges = [_range(cells, ["reached_mm"]), _range(cells, ["load_case_s", "total_s", "scene_s"])]
+    figures = {
+        "map": map_figure(hover_names(maps)),
+        "panels": [precision_figure(*ranges) for _ in range(min(PANELS, len(scenes)))],
+    }
+    return {
+        "banner": _banner(results),
+        "views": list(views.items()),
+        "limit": _slider(float(asked.mode().iloc[0]) if len(asked) else LIMIT_MM),
+        "controls": [*_ways_to_show(cells, scenes, methods), *filters, *map_controls(maps)],
+        "filters": [each["name"] for each in filters],
+        "methods": methods,
+        "columns": list(OF_ONE_SOLVER.items()),
+        "styles": {name: _look(style) for name, style in line_styles(cells).items()},
+        "scenes": scenes,
+        "cells": {
+            **{name: column(cells[name]) for name in (*TEXTS, *NUMBERS)},
+            "options": column(cells["options"].map(_options)),
+        },
+        "maps": maps,
+        "figures": as_items(figures),
+    }
+
+
+def _ways_to_show(cells: pd.DataFrame, scenes: list[Data], methods: list[str]) -> list[Data]:
+    metrics = {name: text for name, text in METRICS.items() if name == "over" or cells[name].notna().any()}
+    if all(scene["ladder"] for scene in scenes):
+        metrics = {"over": metrics["over"]} | metrics
+    named = [("", "–"), *((method, method) for method in methods)]
+    lines = [("method", "best tolerance only"), ("label", "every tolerance")]
+    return [
+        choice("metric", "show", metrics.items(), JUDGED),
+        choice("lines", "lines", lines, "matrix ladders"),
+        choice("base", "ratios to", named, "matrix"),
+        choice("solver", "solver", named, "solver precision"),
+    ]
+
+
+def _range(cells: pd.DataFrame, names: list[str]) -> tuple[float, float]:
+    """A range, with a margin, of positive values in some columns."""
+    values = cells[names].to_numpy(dtype=float)
+    values = values[values > 0]
+    return (float(values.min()) / 2, float(values.max()) * 2) if len(values) else (0.1, 10.0)
+
+
+def _slider(limit_mm: float) -> Data:
+    """The slider of the limit, from about 1e-3 to 1e-12 mm, one of whose steps is the limit of the rows."""
+    exponent = -math.log10(limit_mm)
+    return {"value": exponent, "least": 3 + exponent % 0.5}
+
+
+def _filters(cells: pd.DataFrame) -> list[Data]:
+    """The lists that leave out cells. Machines are never mixed."""
+    filters = [choice("judged", "verdict", [ALL, *VERDICTS.items()], JUDGED)]
+    for name, label in FILTERS.items():
+        values = sorted(set(cells[name].dropna()) - {""})
+        texts = [f"{value:.10g}" if isinstance(value, float) else str(value) for value in values]
+        options = list(zip(texts, texts, strict=True))
+        if len(options) > 1:
+            filters.append(choice(name, label, options if name == "machine" else [ALL, *options], JUDGED))
+    return filters
+
+
+def _cells(results: Results) -> pd.DataFrame:
+    """The cells without the forms that a solver does not take, with the limits and seconds from the scene."""
+    cells = results.cells[results.cells["status"] != "unsupported"]
+    cells = cells.rename(columns={"reference_bound_mm": "bound_mm"})
+    lines = roads(results)
+    if len(lines):
+        lines = lines.assign(scene_s=lines[list(STAGES)].sum(axis=1, skipna=False))
+        cells = cells.merge(lines[[*CELL, "scene_s"]], on=CELL, how="left")
+    else:
+        cells = cells.assign(scene_s=float("nan"))
+    eased = cells["scene"].str.startswith(LADDERS) & (cells["limit_mm"] > cells["limit_asked_mm"])
+    known = cells["displacement_error_mm"].notna()
+    titles = {problem.get("scene"): str(problem.get("title") or "") for problem in records(results.problems)}
+    share = pd.cut(cells["active"] / cells["m"], [-1.0, *CONTACT.values()], labels=list(CONTACT))
+    cells = cells.assign(
+        least_mm=cells["limit_mm"].where(eased),
+        reached_mm=cells[["displacement_error_mm", "bound_mm"]].max(axis=1).clip(*DRAWN_MM).where(known),
+        total_s=cells["load_case_s"] + cells["once_s"].fillna(0.0),
+        ladder=cells["scene"].map(_ladder),
+        title=cells["scene"].map(lambda scene: titles.get(scene, "")),
+        contact=share.cat.add_categories("").fillna("").astype(object),
+    )
+    return cells if "options" in cells else cells.assign(options=None)
+
+
+def _options(options: object) -> str:
+    given = options if isinstance(options, dict) else {}
+    return ", ".join(f"{name} = {value}" for name, value in given.items())
+
+
+def _look(style: dict[str, Any]) -> Data:
+    """Colours, marker and dashes of a method, as in the report's figures."""
+    marker, turn, sign = MARKERS[style["marker"]]
+    color, face, dashes = style["color"], style["markerfacecolor"], style["linestyle"]
+    return {
+        "color": color,
+        "face": face,
+        "marker": marker,
+        "angle": math.radians(turn),
+        "dash": "solid" if dashes == "-" else "dashed" if len(dashes[1]) == 2 else "dashdot",
+        "sign": sign,
+        "css": f"color: {face}; -webkit-text-stroke: 1px {color}",
+    }
+
+
+def _ladder(scene: str) -> str:
+    return scene.split("/")[1] if scene.startswith(LADDERS) else ""
+
+
+def _banner(results: Results) -> Data:
+    rows = results.rows
+    versions = rows[rows["solver_version"] != ""].groupby("solver")["solver_version"].unique()
+    again = f", {results.left_out} of them measured again or in search of a tolerance"
+    return banner(
+        rows,
+        counts=f"{len(rows) + results.left_out} rows{again if results.left_out else ''}",
+        versions=[f"{solver} {listed(sorted(found))}" for solver, found in versions.items()],
+        warnings=warnings(results),
+    )
+
+
+def _scenes(results: Results) -> list[Data]:
+    """The scenes in the order of the suite, on ladders, else by size and active contacts."""
+    cells = results.cells.drop_duplicates("scene").sort_values(["n", "active", "scene"])
+    scenes = cells.set_index("scene")
+    ordered = list(scenes.index)
+    if all(name.startswith(LADDERS) for name in ordered):
+        ordered = [name for name in results.suite.get("scenes", []) if name in scenes.index]
+    return [
+        {"scene": name, "ladder": _ladder(name), "heading": _heading(name, scenes.loc[name])}
+        for name in dict.fromkeys([*ordered, *scenes.index])
+    ]
+
+
+def _heading(scene: str, sizes: pd.Series[Any]) -> str:
+    """The ladder and the rung, or the scene with its share of closed contacts."""
+    if _ladder(scene):
+        return scene.split("/", 1)[1]
+    share = sizes["active"] / sizes["m"] if sizes["m"] else math.nan
+    return scene if math.isnan(share) else f"{scene} · {share:.0%}"
