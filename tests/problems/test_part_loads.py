@@ -1,5 +1,6 @@
 """Weight, heat, shifted supports and pads against beam theory and statics."""
 
+import doctest
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from problems.effects.self_weight import SelfWeight
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
 from problems.forms.prepared import Prepared
+from problems.model import effect, part
 from problems.model.effect import Effect
 from problems.model.joint import Joint
 from problems.model.joint_model import JointModel
@@ -43,6 +45,10 @@ def strip(*effects: Effect) -> NDArray[np.float64]:
     """Deflections of the strip's middle line at ALONG."""
     x, _ = solved(STRIP_JOINT, *effects)
     return x.reshape(6, 3)[:, 1]
+
+
+def test_the_examples_for_authors_of_effects_run() -> None:
+    assert [doctest.testmod(module) for module in (effect, part)] == [(0, 2), (0, 6)]
 
 
 def test_a_heavy_cantilever() -> None:
