@@ -35,8 +35,8 @@ class Numbering:
         sizes, offset = [], 0
         for block in blocks:
             free = [free_unknowns(models[part]) for part in block]
-            grid = [_grid_lines(models[part], own) for part, own in zip(block, free, strict=True)]
-            x, y = (np.concatenate(numbers) for numbers in zip(*grid, strict=True))
+            numbers_of_lines = [_mesh_lines(models[part], own) for part, own in zip(block, free, strict=True)]
+            x, y = (np.concatenate(numbers) for numbers in zip(*numbers_of_lines, strict=True))
             line, across = (x, y) if _widest(x) <= _widest(y) else (y, x)
             owner = np.repeat(np.arange(len(block)), [own.size for own in free])
             rank = np.empty(len(line), dtype=np.intp)
@@ -61,11 +61,11 @@ def free_unknowns(model: PartModel) -> Indices:
 def lines_across(model: PartModel) -> list[Indices]:
     """The unknowns that are not built in, on each mesh line across the longer direction of a part."""
     free = free_unknowns(model)
-    line = min(_grid_lines(model, free), key=_widest)
+    line = min(_mesh_lines(model, free), key=_widest)
     return [free[line == k] for k in range(line.min(), line.max() + 1)]
 
 
-def _grid_lines(model: PartModel, unknowns: Indices) -> tuple[Indices, Indices]:
+def _mesh_lines(model: PartModel, unknowns: Indices) -> tuple[Indices, Indices]:
     """The number of the mesh line x = const, and of the line y = const, on which each unknown lies."""
     nx, ny = len(model.plate.x), len(model.plate.y)
     iy, _, ix, _ = np.unravel_index(unknowns, (ny, 2, nx, 2))

@@ -173,7 +173,7 @@ class StiffnessEffect(ElementEffect):
         Returns
         -------
         (plate.size, plate.size) csr_array
-            Symmetric but for rounding, N/mm for deflections; coupling only neighbouring grid lines y = const.
+            Symmetric but for rounding, N/mm for deflections; coupling only neighbouring mesh lines y = const.
         """
 
 

@@ -24,7 +24,7 @@ from problems.input.bounded_types import Name, Positive
 from .plate import Plate
 from .surface import Grid
 
-MOST, MOST_NODES = 100_000, 10**7  # grid lines, nodes; what fits in memory is another question
+MOST, MOST_NODES = 100_000, 10**7  # mesh lines, nodes; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]
 SHORT = 20.0  # mm, a junction that may have been given in metres
 SLENDER = 50.0  # an element's longer side to its shorter
@@ -219,7 +219,7 @@ class Joint(Table):
         return A
 
     def plate(self, part: Part) -> Plate:
-        """The finite-element model of a part: the junction's grid lines and those of its extensions."""
+        """The finite-element model of a part: the mesh lines of the junction and those of its extensions."""
         y = [self.y]
         if part.south:
             y.insert(0, np.linspace(-part.south.length, 0.0, part.south.elements + 1)[:-1])

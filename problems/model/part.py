@@ -72,7 +72,7 @@ class PartModel:
 
     @property
     def free_lines(self) -> list[int]:
-        """The grid lines that are not built in, by ascending y."""
+        """The mesh lines that are not built in, by ascending y."""
         return [line for line in range(len(self.plate.y)) if line not in self.clamped]
 
     @property
@@ -133,7 +133,7 @@ PEAK = 2.0  # lines stay to which effects add more than PEAK times the median st
 
 
 def graded(model: PartModel) -> PartModel:
-    """The same part with fewer grid lines beyond its junction."""
+    """The same part with fewer mesh lines beyond its junction."""
     first, last, end = model.junction.start, model.junction.stop - 1, len(model.plate.y) - 1
     kept = set(model.junction) | {first - k for k in _graded(first)} | {last + k for k in _graded(end - last)}
     kept |= _stiff_lines(model)

@@ -1,11 +1,11 @@
-"""A rectangular Kirchhoff plate of Bogner–Fox–Schmit elements on a tensor grid.
+"""A rectangular Kirchhoff plate of Bogner–Fox–Schmit elements on a tensor mesh.
 
 Four degrees of freedom per node: w, w_x, w_y, w_xy. The shape functions are products of cubic
 Hermite functions, so the stiffness is a sum of Kronecker products of one-dimensional matrices:
 
     K = D [My⊗Hx + Hy⊗Mx + ν (By⊗Bxᵀ + Byᵀ⊗Bx) + 2(1−ν) Gy⊗Gx],   D = E t³ / (12 (1 − ν²))
 
-Source: Bogner, Fox, Schmit, Proc. Conf. Matrix Methods in Struct. Mech., 1965. On a line each grid point
+Source: Bogner, Fox, Schmit, Proc. Conf. Matrix Methods in Struct. Mech., 1965. On a line each node
 carries two degrees of freedom, value and derivative, numbered 2i and 2i + 1.
 """
 
@@ -107,12 +107,12 @@ class Plate:
         return sum(factor * sp.kron(*(pair if along_x else pair[::-1])) for factor, pair in terms).tocsr()
 
     def line_dofs(self, line: int) -> np.ndarray:
-        """The 4 nx degrees of freedom on the grid line y[line]."""
+        """The 4 nx degrees of freedom on the mesh line y[line]."""
         width = 4 * len(self.x)
         return np.arange(line * width, (line + 1) * width)
 
     def deflection_dofs(self, line: int) -> np.ndarray:
-        """The nx deflections on the grid line y[line], in order of ascending x."""
+        """The nx deflections on the mesh line y[line], in order of ascending x."""
         return 4 * len(self.x) * line + 2 * np.arange(len(self.x))
 
 
