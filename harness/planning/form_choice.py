@@ -1,4 +1,4 @@
-"""The memory that a scene will need in each form, and the form in which it is solved where none is asked for.
+"""Predicts the memory that a scene needs in each form, and chooses the form where the user names none.
 
 The memory is counted from the entries of the matrices, before they are built. The dense forms keep K and its
 factors, Σ 2 b² entries for blocks of b unknowns, and Q, m² entries. The sparse form keeps the factors of K̂,
@@ -56,7 +56,7 @@ class Size:
 
 
 def size_of(scene: Scene) -> Size | None:
-    """Of a joint of plates, or of sparse matrices; None for arrays, which then fit, or small matrices."""
+    """The size of a joint of plates or of sparse matrices; None for dense arrays, already in memory."""
     match scene:
         case JointScene(joint=Joint() as joint):
             return _of_joint(scene, joint)
@@ -83,20 +83,21 @@ def _holds_sparse(scene: JointScene) -> bool:
 
 
 def _dense(blocks: Sequence[int], m: int) -> tuple[float, float]:
-    """MiB of K, its factors and Q, and at the peak: with a copy of the largest block and of Q."""
+    """MiB of K, its factors and Q; and of the process at its peak, with copies of the largest block and Q."""
     stored = 8 * (2 * sum(block**2 for block in blocks) + m**2) / MIB
     return stored, PROCESS_MIB + stored + 8 * (max(blocks) ** 2 + m**2) / MIB
 
 
 def _of_joint(scene: JointScene, joint: Joint) -> Size:
-    """From the numbering of the full model; springs between parts are taken to make one block of all.
+    """The size of a joint, from the numbering of the full model.
 
-    An element joins a node, with 4 unknowns, to the next on the next line: 4 (nodes per line + 1) + 3.
+    Springs between parts are assumed to join all parts to one block. An element joins a node, with 4
+    unknowns, to the next one on the next line: the half-bandwidth is 4 (nodes per line + 1) + 3.
     """
     tied = any(scene.effects_of(SpringEffect))
     (n, m), (nx, ny) = joint.size, joint.junction.nodes
     dense = _dense([n] if tied else [joint.node_count] * len(joint.part), m)
-    # The grid lines y = const of each part that are not built in.
+    # The lines y = const of each part's mesh that are not clamped.
     lines = [
         ny + sum(side.elements for side in (part.south, part.north) if side) - len(set(part.clamped))
         for part in joint.part
@@ -131,15 +132,15 @@ class Choice:
     why: str = ""
 
 
-def chosen_form(scene: Scene, taken: Sequence[Form], asked: Form | None, cases: int = 1) -> Choice:
-    """The form asked for, else by the rule, of those that a solver takes.
+def chosen_form(scene: Scene, taken: Sequence[Form], form: Form | None, cases: int = 1) -> Choice:
+    """The form that the user names, else that of the rule, for a solver that takes some forms.
 
-    Raises InputError if it is not among these, or if this machine's memory cannot hold it.
+    Raises InputError if the solver does not take it, or if this machine's memory cannot hold it.
     """
-    if asked is not None and asked not in taken:
-        raise InputError.one("--form", "form", asked, f"the solver takes {' and '.join(taken)}")
+    if form is not None and form not in taken:
+        raise InputError.one("--form", "form", form, f"the solver takes {' and '.join(taken)}")
     size = size_of(scene)
-    choice = _by_rule(scene, size, taken, cases) if asked is None else Choice(asked)
+    choice = _by_rule(scene, size, taken, cases) if form is None else Choice(form)
     refuse_what_cannot_fit(scene, size, choice.form)
     return choice
 

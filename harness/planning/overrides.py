@@ -1,4 +1,4 @@
-"""What the command line changes in a suite."""
+"""Changes a suite as the command line says."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     if change.scenes:
         data["scenes"] = resolved_scenes(list(change.scenes), "--scene", "scene", Path.cwd(), faults)
     if change.sizes:
-        known = {scene: read_scene(scene).expected_size for scene in ([] if faults else data["scenes"])}
-        sizes = {scene: size[0] for scene, size in known.items() if size is not None}
+        expected = {scene: read_scene(scene).expected_size for scene in ([] if faults else data["scenes"])}
+        sizes = {scene: size[0] for scene, size in expected.items() if size is not None}
         for size in set(change.sizes) - set(sizes.values()):
             allowed = ", ".join(map(str, sorted(set(sizes.values()))))
             faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
@@ -93,11 +93,9 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     if solvers:
         data["solver"] = [entry for entry in data["solver"] if entry["name"] in solvers]
     named = {entry["name"] for entry in data["solver"]}
-    own = [change.plugin.stem] if change.plugin and not solvers else []
-    data["solver"] += [{"name": name} for name in (*solvers, *own) if name not in named]
-    data["solver"] = [
-        entry | asked for entry in data["solver"] for asked in versions.get(entry["name"], [{}])
-    ]
+    plugins = [change.plugin.stem] if change.plugin and not solvers else []
+    data["solver"] += [{"name": name} for name in (*solvers, *plugins) if name not in named]
+    data["solver"] = [entry | at for entry in data["solver"] for at in versions.get(entry["name"], [{}])]
     changes = {
         "tolerances": change.tolerances if change.tolerances == "auto" else list(change.tolerances),
         "repeats": change.repeats,
@@ -125,11 +123,11 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
 
 
 def _versions(change: Overrides, faults: list[Fault]) -> dict[str, list[dict[str, Any]]]:
-    """Of each solver whose library --with names, what the entry of each version says.
+    """The changes in the entries of each solver whose library --with names, one for each version.
 
     The solver has the library's name; if there is none, it is the only one that --solver names.
     """
-    found: dict[str, list[dict[str, Any]]] = {}
+    changes: dict[str, list[dict[str, Any]]] = {}
     for requirement in change.requirements:
         library, equals, version = requirement.partition("==")
         if not WORD.fullmatch(library) or bool(equals) != bool(version):
@@ -137,8 +135,8 @@ def _versions(change: Overrides, faults: list[Fault]) -> dict[str, list[dict[str
             faults.append(Fault("--with", "with", requirement, allowed))
         other = len(change.solvers) == 1 and library not in modules()
         solver = change.solvers[0] if other else library
-        found.setdefault(solver, []).append({"with": [requirement] if version else None})
-    return found
+        changes.setdefault(solver, []).append({"with": [requirement] if version else None})
+    return changes
 
 
 def _set_options(entries: list[dict[str, Any]], options: Sequence[str], faults: list[Fault]) -> None:
@@ -165,12 +163,8 @@ def tolerances_of(words: Sequence[str]) -> tuple[float, ...] | Literal["auto"]:
     """The values of --tolerance: numbers, or "auto" alone. Raises InputError."""
     if list(words) == ["auto"]:
         return "auto"
-    found, faults = [], []
-    for word in words:
-        try:
-            found.append(float(word))
-        except ValueError:
-            faults.append(Fault("--tolerance", "tolerance", word, "a number, or auto alone"))
-    if faults:
-        raise InputError(faults)
-    return tuple(found)
+    try:
+        return tuple(map(float, words))
+    except ValueError as error:
+        allowed = "numbers, or auto alone"
+        raise InputError.one("--tolerance", "tolerance", " ".join(words), allowed) from error

@@ -19,7 +19,7 @@ from solvers.base import FORMS, Form
 
 from .suite import RandomCases, SolverEntry, Suite
 
-#: Of tolerances = "auto", the loosest first, and of repeats = "auto".
+#: The tolerances of "auto", the loosest first, and the largest number of repeats of "auto".
 DECADES = [float(f"1e-{k}") for k in range(3, 17)]
 MOST_REPEATS = 5
 
@@ -70,7 +70,7 @@ class Measurement:
 
     @property
     def process(self) -> tuple[object, ...]:
-        """What the load cases of a series share that are solved in one process."""
+        """The identity of a process, which load cases of a series may share."""
         return self.scene, self.solver, self.form, self.variant, self.tolerance, self.threads, self.repeat
 
     @cached_property
@@ -85,8 +85,9 @@ class Measurement:
 
     def same_settings(self, row: Mapping[str, Any]) -> bool:
         """Whether a row is of this solver, form, options and threads, whatever its scene and tolerance."""
-        mine = (self.solver, self.form, self.variant, self.entry.options, self.threads)
-        return tuple(row[name] for name in ("solver", "form", "variant", "options", "threads_asked")) == mine
+        settings = (self.solver, self.form, self.variant, self.entry.options, self.threads)
+        names = ("solver", "form", "variant", "options", "threads_asked")
+        return tuple(row[name] for name in names) == settings
 
     @property
     def stem(self) -> str:
@@ -97,12 +98,11 @@ class Measurement:
 
 
 def expand(suite: Suite) -> list[Measurement]:
-    """All measurements of a suite, scene by scene, the load cases of a series in order; none on a rung that
-    the model should refuse.
+    """All measurements of a suite, scene by scene, except on rungs that the model should refuse.
 
-    Repeats are interleaved: a round in the suite's order, then rounds each shuffled with its own seed, so
-    that a drift of the machine does not affect one solver alone. Measurements that differ only in tolerance
-    keep their order, so that a loose tolerance can show that a tight one would exceed the time limit.
+    Repeats are interleaved: a round in the suite's order, then rounds in random orders, so that a drift of
+    the machine does not affect one solver alone. Measurements that differ only in tolerance or load case keep
+    their order: a loose tolerance can show that a tight one would exceed the time limit.
 
     Raises InputError if nothing is left to measure or if two files have the same scene name.
     """
@@ -123,52 +123,37 @@ def expand(suite: Suite) -> list[Measurement]:
         raise InputError(faults)
     plan: dict[str, Measurement] = {}
     for source, scene in scenes.items():
-        entries = [
-            (e, _rounds(e.repeats or suite.repeats)) for e in suite.solver if _applies(e, scene.name, source)
-        ]
-        rounds = max((repeats for _, repeats in entries), default=0)
-        for repeat in range(rounds):
-            due = [entry for entry, repeats in entries if repeat < repeats]
-            one_round = [made for entry in due for made in _of_entry(suite, entry, scene, source, repeat)]
-            for measurement in _shuffled(one_round, f"{scene.name} {repeat}") if repeat else one_round:
-                plan.setdefault(measurement.key, measurement)
+        entries = [entry for entry in suite.solver if _applies(entry, scene.name, source)]
+        measurements = [m for entry in entries for m in _of_entry(suite, entry, scene, source)]
+        for m in sorted(measurements, key=_round_and_place):
+            plan.setdefault(m.key, m)
     if not plan:
-        restricted = {entry.name: entry.scenes for entry in suite.solver}
-        raise InputError.one(
-            suite.name, "scenes", suite.scenes, f"no solver is meant for these: {restricted}"
-        )
+        allowed = f"no solver is meant for these: { ({entry.name: entry.scenes for entry in suite.solver}) }"
+        raise InputError.one(suite.name, "scenes", suite.scenes, allowed)
     return list(plan.values())
 
 
-def _shuffled(one_round: list[Measurement], seed: str) -> list[Measurement]:
-    """In random order, but keeping the relative order of those that differ only in tolerance."""
-
-    def kind(m: Measurement) -> tuple[str, str, str, int]:
-        return m.solver, m.form, m.variant, m.threads
-
-    kinds = [kind(m) for m in one_round]
-    random.Random(seed).shuffle(kinds)
-    queues = {each: iter([m for m in one_round if kind(m) == each]) for each in set(kinds)}
-    return [next(queues[each]) for each in kinds]
-
-
-def _of_entry(
-    suite: Suite, entry: SolverEntry, scene: Scene, source: str, repeat: int
-) -> Iterator[Measurement]:
-    asked = entry.tolerances or suite.tolerances
-    tolerances = DECADES if asked == "auto" else asked
+def _of_entry(suite: Suite, entry: SolverEntry, scene: Scene, source: str) -> Iterator[Measurement]:
+    tolerances = entry.tolerances or suite.tolerances
+    repeats = entry.repeats or suite.repeats
     n, _ = scene.expected_size or (0, 0)
     time_limit_s = entry.time_limit_s or suite.time_limit(n)
-    cases = range(entry.cases or suite.series.cases) if suite.series else (None,)
-    threads_asked = entry.threads or suite.threads
-    for form, tolerance, threads, case in product(entry.forms or FORMS, tolerances, threads_asked, cases):
+    for form, tolerance, threads, repeat, case in product(
+        entry.forms or FORMS,
+        DECADES if tolerances == "auto" else tolerances,
+        entry.threads or suite.threads,
+        range(MOST_REPEATS if repeats == "auto" else repeats),
+        range(entry.cases or suite.series.cases) if suite.series else (None,),
+    ):
         yield Measurement(
             suite, entry, scene.name, source, form, tolerance, threads, repeat, time_limit_s, case
         )
 
 
-def _rounds(repeats: int | str) -> int:
-    return MOST_REPEATS if isinstance(repeats, str) else repeats
+def _round_and_place(m: Measurement) -> tuple[int, float]:
+    """The round of a measurement, and a random place in it, where the first round keeps the suite's order."""
+    words = f"{m.scene} {m.repeat} {m.solver} {m.form} {m.variant} {m.threads}"
+    return m.repeat, random.Random(words).random() if m.repeat else 0.0
 
 
 def _applies(entry: SolverEntry, name: str, source: str) -> bool:
@@ -186,8 +171,9 @@ def with_key(suite: Suite, key: str) -> Suite:
 
 
 def of_key(plan: Sequence[Measurement], key: str) -> list[Measurement]:
-    """The measurement with this key. A load case of a series comes after those that its process solves before
-    it, because its start depends on them. Raises InputError.
+    """The measurement with this key. Raises InputError.
+
+    A load case of a series comes after the earlier ones of its process, because its start depends on them.
     """
     chosen = next((m for m in plan if m.key == key), None)
     if chosen is None:

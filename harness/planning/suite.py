@@ -49,7 +49,7 @@ from solvers.registry import modules, solver_names
 
 SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
-FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # what a file may be called
+FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # no control characters, no slashes
 Auto = Annotated[Literal["auto"], Tag(WORD)]
 Repeats = Annotated[Annotated[int, Field(ge=1, le=1000), Tag(VALUE)] | Auto, Discriminator(is_word)]
 Tolerances = Annotated[Annotated[list[Positive], NonEmpty, Tag(VALUE)] | Auto, Discriminator(is_word)]
@@ -67,7 +67,7 @@ Requirement = Annotated[str, AfterValidator(pinned)]
 
 
 class SolverEntry(BaseModel):
-    """One [[solver]]: its name and options, and what it is measured on.
+    """One [[solver]]: its name and options, and the scenes, forms and tolerances that it is measured on.
 
     The default of `forms` is the dual, or the primal if the solver takes no other. `threads` and `cases`
     override the suite's. "auto" as tolerances searches for the loosest decade that reaches the limit on each
@@ -94,20 +94,20 @@ class SolverEntry(BaseModel):
 
     @property
     def version(self) -> str:
-        """What `with` asks for, without the solver's own name: "0.6.2", "proxsuite==0.7.2"; "" if nothing."""
+        """The versions of `with`, without the solver's own name: "0.6.2", "proxsuite==0.7.2"; or ""."""
         return " ".join(self.requirements or ()).removeprefix(f"{self.name}==")
 
     @property
     def label(self) -> str:
-        """What tells its rows from those of other entries for the solver: the variant and the version."""
+        """The variant and the version, which distinguish the rows of the solver's entries."""
         return f"{self.variant} {self.version}".strip()
 
 
 class RandomCases(BaseModel):
     """[series]: each scene with `cases` random initial gaps, solved one after another in one process.
 
-    mean, sd and correlation_length, mm, are by default those of the scene's `initial_gap`. fasteners : one of
-    the scene's is taken out or put back in between (problems/load_cases/stream.py).
+    mean, sd and correlation_length, mm, are by default those of the scene's `initial_gap`. fasteners :
+    between two cases, a fastener of the scene is taken out or put back (problems/load_cases/stream.py).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -125,10 +125,9 @@ class Suite(BaseModel):
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
-    stop_at_times_fastest stops what takes that many times as long as the fastest library
-    (tolerance_search.py).
-    after reference_limit_s no further method is tried for a reference; by default 60 s per thousand
-    contacts, at least 60.
+    stop_at_times_fastest stops a measurement that takes so many times as long as the fastest library
+    (tolerance_search.py). After reference_limit_s no further method is tried for a reference; by default 60 s
+    per thousand contacts, at least 60.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -211,33 +210,33 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
     Only patterns that begin with "hard/" or "hard-full/" match rungs of ladders, and only names and ranges
     ("drawn/4386/0..59") scenes drawn at random.
     """
-    found: dict[str, None] = {}
+    scenes: dict[str, None] = {}
     for pattern in map(str, patterns):
         if Path(pattern).suffix in (".toml", ".npz"):
             path = resolved(base / pattern)
             if not path.is_file():
                 faults.append(Fault(where, key, pattern, "no such file"))
-            found[str(path)] = None
+            scenes[str(path)] = None
             continue
         prefix = prefix_of(pattern)
-        known = rung_names(prefix) if prefix else scene_names()
-        names = drawn_names(pattern) or [name for name in known if fnmatchcase(name, pattern)]
+        packaged = rung_names(prefix) if prefix else scene_names()
+        names = drawn_names(pattern) or [name for name in packaged if fnmatchcase(name, pattern)]
         if not names:
-            faults.append(Fault(where, key, pattern, unknown("scene", pattern, [*known, *EXAMPLES])))
-        found |= dict.fromkeys(names)
-    return list(found) or list(map(str, patterns))
+            faults.append(Fault(where, key, pattern, unknown("scene", pattern, [*packaged, *EXAMPLES])))
+        scenes |= dict.fromkeys(names)
+    return list(scenes) or list(map(str, patterns))
 
 
 def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
     entries = data["solver"] if isinstance(data.get("solver"), list) else []
     names = {k: str(e["name"]) for k, e in enumerate(entries) if isinstance(e, dict) and "name" in e}
-    known = [*modules(), *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
-    if not set(names.values()) <= set(known):
-        known += [name for name in solver_names() if name not in known]  # slow: imports every library
+    solvers = [*modules(), *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
+    if not set(names.values()) <= set(solvers):
+        solvers += [name for name in solver_names() if name not in solvers]  # slow: imports every library
     return [
-        Fault(str(path), f"solver.{k}.name", name, unknown("solver", name, known))
+        Fault(str(path), f"solver.{k}.name", name, unknown("solver", name, solvers))
         for k, name in names.items()
-        if name not in known
+        if name not in solvers
     ]
 
 
@@ -251,13 +250,13 @@ def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
             "`batched`": entry.batched is not None,
         }
         first = above.setdefault((entry.name, entry.label), setting)
-        if other := [what for what in setting if first[what] != setting[what]]:
+        if other := [key for key in setting if first[key] != setting[key]]:
             allowed = f"{entry.name} has other {other[0]} under this variant above; choose another variant"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
 
 
 def _of_series(suite: Suite, path: Path) -> Iterator[Fault]:
-    """What only a suite with [series] has, and what such a suite has not."""
+    """Keys that need [series] in a suite without it, and values that a suite with it cannot have."""
     places: list[tuple[str, Suite | SolverEntry]] = [("", suite)]
     places += [(f"solver.{k}.", entry) for k, entry in enumerate(suite.solver)]
     for where, place in places:

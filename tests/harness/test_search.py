@@ -187,7 +187,7 @@ def test_bad_options(tmp_path: Path, change: dict[str, Any], words: list[str]) -
 def test_tolerances_of_the_command_line() -> None:
     assert tolerances_of(["auto"]) == "auto"
     assert tolerances_of(["1e-6", "1e-9"]) == (1e-6, 1e-9)
-    with pytest.raises(InputError, match="a number, or auto alone"):
+    with pytest.raises(InputError, match="numbers, or auto alone"):
         tolerances_of(["1e-6", "auto"])
 
 
