@@ -1,4 +1,4 @@
-"""What a reader must know before trusting the figures: mixed and damaged results, and other code."""
+"""Reasons to doubt the figures of a report: mixed and damaged results, and other code."""
 
 from __future__ import annotations
 
@@ -16,26 +16,25 @@ DIGITS = 10  # of a commit, in sentences
 def warnings(results: Results) -> list[str]:
     """One sentence per fault, the gravest first."""
     rows = results.rows
-    found = code_warnings(rows)
+    doubts = code_warnings(rows)
     machines = rows["machine"].replace("", "a machine not recorded")
     if machines.nunique() > 1:
-        found.append(
+        doubts.append(
             f"The rows come from {machines.nunique()} machines: {_with_rows(machines)}. "
             "They are reported one after the other; no table, mean or figure mixes them."
         )
-    found += _unfinished(results)
+    doubts += _unfinished(results)
     for solver, versions in _several(rows[~asked_for(rows)], "solver_version").items():
-        found.append(f"{solver} was run in several versions: {listed(versions)}.")
+        doubts.append(f"{solver} was run in several versions: {listed(versions)}.")
     for versions in _several(rows.assign(solver=""), "rivetbench_version").values():
-        found.append(f"The rows were written by several versions of rivetbench: {listed(versions)}.")
-    known = rows.dropna(subset=["threads", "threads_asked"])
-    other = known[known["threads"] != known["threads_asked"]]
+        doubts.append(f"The rows were written by several versions of rivetbench: {listed(versions)}.")
+    other = rows[rows["threads"].notna() & (rows["threads"] != rows["threads_asked"])]
     if len(other):
-        found.append(
+        doubts.append(
             f"In {counted(len(other), 'row')} ({listed(sorted(other['solver'].unique()))}) the number of "
             "threads in effect was not the requested one; the tables give the one in effect."
         )
-    return [*found, *results.warnings]
+    return [*doubts, *results.warnings]
 
 
 def asked_for(rows: pd.DataFrame) -> pd.Series[bool]:
@@ -46,21 +45,21 @@ def asked_for(rows: pd.DataFrame) -> pd.Series[bool]:
 
 def code_warnings(rows: pd.DataFrame) -> list[str]:
     """One sentence per reason to doubt that the rows are of one code, and of the code that is running."""
-    found: list[str] = []
+    doubts: list[str] = []
     commits = rows["commit"]
     if commits.nunique() > 1:
-        found.append(f"The tables mix rows measured with different code: {_with_rows(commits.map(_short))}.")
+        doubts.append(f"The tables mix rows measured with different code: {_with_rows(commits.map(_short))}.")
     elif (commits == "").any():
-        found.append("No row records the commit it was measured with.")
+        doubts.append("No row records the commit it was measured with.")
     if changed := int((rows["clean"] == 0).sum()):
         which = f"{counted(changed, 'row')} {_was(changed)}"
-        found.append(f"{which} measured with uncommitted changes to that commit.")
+        doubts.append(f"{which} measured with uncommitted changes to that commit.")
     if mixed := _several(rows, "solver_code"):
-        found.append(f"The tables mix rows of different code of {listed([*mixed])}.")
+        doubts.append(f"The tables mix rows of different code of {listed([*mixed])}.")
     if other := int((~commits.isin(["", commit()[0]])).sum()):
         which = "All rows were" if other == len(rows) else f"{other} of {len(rows)} rows {_was(other)}"
-        found.append(f"{which} measured with older code than the code that drew this report.")
-    return found
+        doubts.append(f"{which} measured with older code than the code that drew this report.")
+    return doubts
 
 
 def commits_text(rows: pd.DataFrame) -> str:

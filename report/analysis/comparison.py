@@ -1,4 +1,4 @@
-"""What changed between two runs, measurement by measurement, what became worse first.
+"""Compares two runs, measurement by measurement; those that became worse come first.
 
 Repeats are merged so that nothing looks better than it was: the worst verdict with its status, the largest
 error, the median of the iterations and of the seconds per load case t = set-up + solve + form. The ratio of
@@ -9,12 +9,12 @@ times, median over median, has the interval
 over the repeats. A side with fewer than three is taken to vary by the factor TIE, as single runs do. With
 three on each side, all of the new ones are slower by chance alone once in 20 times.
 
-The other measurements show how much single runs vary on this machine. Of the ratios r of SEVERAL or more,
-with the median r₀ and the median s of |log r − log r₀|, one is a change beyond
+The other measurements show how much single runs vary on this machine. With SEVERAL or more ratios r, their
+median r₀, and the median s of |log r − log r₀|, a ratio is a change beyond
 
-    r₀ exp(5 · 1.4826 s),
+    r₀ exp(5 · 1.4826 s).
 
-so that a machine that was slower, or more restless, in one of the runs is no change of a method.
+So a machine that was slower, or more restless, during one of the runs does not count as a change.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ENOUGH = 3  # repeats whose spread says how much times vary
 SEVERAL = 8  # measurements whose ratios say how much single runs vary
 MISSING = "not measured"
 WORSE, CHANGED, BETTER, ADDED, SAME = "worse", "another status", "better", "new", "alike"
-#: The kinds of lines, in their order, and the group of each.
+#: The kinds of lines in their order, and their groups.
 GONE, JUDGED_WORSE, DIGITS, SLOWER, OTHER_STATUS, GAINED, NEW, UNCHANGED = range(8)
 GROUPS = (WORSE, WORSE, WORSE, WORSE, CHANGED, BETTER, ADDED, SAME)
 
@@ -48,8 +48,8 @@ def compared(
     timed : whether times can be compared. Beside the figures of both sides, with the endings _old and _new:
     `digits_lost`, `ratio` with `ratio_least` and `ratio_most`, `group`, and `change` in words.
     """
-    before, after = merged(old).add_suffix("_old"), merged(new).add_suffix("_new")
-    table = before.join(after, how="outer").reset_index()
+    older, newer = merged(old).add_suffix("_old"), merged(new).add_suffix("_new")
+    table = older.join(newer, how="outer").reset_index()
     for side in ("old", "new"):
         for name in ("verdict", "status"):
             table[f"{name}_{side}"] = table[f"{name}_{side}"].fillna(MISSING)
@@ -61,8 +61,8 @@ def compared(
         _widen(table)
     else:
         table[["ratio", "ratio_least", "ratio_most"]] = np.nan
-    found = [_change(line, max_digits_lost, max_slowdown) for line in table.to_dict("records")]
-    table[["kind", "change", "size"]] = pd.DataFrame(found, table.index, ["kind", "change", "size"])
+    changes = [_change(line, max_digits_lost, max_slowdown) for line in table.to_dict("records")]
+    table[["kind", "change", "size"]] = pd.DataFrame(changes, table.index, ["kind", "change", "size"])
     order = {"kind": True, "size": False, "measurement": True}
     table["group"] = [GROUPS[kind] for kind in table["kind"]]
     ordered = table.sort_values([*order], ascending=[*order.values()], ignore_index=True)
@@ -84,7 +84,7 @@ def merged(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _widen(table: pd.DataFrame) -> None:
-    """Widen the intervals of single runs to what the ratios of the others are like."""
+    """Widen the intervals of single runs to the spread of all their ratios."""
     single = table[["repeats_old", "repeats_new"]].min(axis=1) < ENOUGH
     logs = np.log(table.loc[single, "ratio"].dropna())
     if len(logs) < SEVERAL:
@@ -107,21 +107,19 @@ def _errors(table: pd.DataFrame) -> list[pd.Series[float]]:
     return [table["error_mm_old"], table["error_mm_new"], bounds, limits]
 
 
-def _digits(before: float, after: float, bound: float, limit: float) -> float:
+def _digits(old: float, new: float, bound: float, limit: float) -> float:
     floor = floor_mm(0.0 if np.isnan(bound) else bound, limit)
-    if not (np.isfinite([before, after, floor]).all() and floor > 0):
-        return np.nan
-    return digits_lost(before, after, floor)
+    return digits_lost(old, new, floor) if np.isfinite([old, new, floor]).all() and floor > 0 else np.nan
 
 
 def _change(line: dict[Hashable, Any], max_digits_lost: float, max_slowdown: float) -> tuple[int, str, float]:
-    """The kind of a line, what is to be said of it, and how large its change is among those of its kind."""
-    before, after = (line[f"verdict_{side}"] for side in ("old", "new"))
+    """The kind of a line, its change in words, and the size of the change among lines of that kind."""
+    old, new = line["verdict_old"], line["verdict_new"]
     lost, ratio = line["digits_lost"], line["ratio"]
-    verdict, ranks = f"{_words(before)} → {_words(after)}", _rank(after) - _rank(before)
-    if after == MISSING:
+    verdict, ranks = f"{_words(old)} → {_words(new)}", _rank(new) - _rank(old)
+    if new == MISSING:
         return GONE, "no longer measured", 0.0
-    if before == MISSING:
+    if old == MISSING:
         return NEW, "new", 0.0
     if ranks > 0:
         return JUDGED_WORSE, verdict, ranks
@@ -151,7 +149,7 @@ def by_solver(table: pd.DataFrame) -> pd.DataFrame:
     both = table[(table[["verdict_old", "verdict_new"]] != MISSING).all(axis=1)]
     both = both.assign(worse=both["group"] == WORSE, better=both["group"] == BETTER)
     both["ratio"] = np.log(both["ratio"])
-    found = both.groupby("solver_new").agg(
+    lines = both.groupby("solver_new").agg(
         measurements=("group", "size"),
         worse=("worse", "sum"),
         better=("better", "sum"),
@@ -159,4 +157,4 @@ def by_solver(table: pd.DataFrame) -> pd.DataFrame:
         most_digits_lost=("digits_lost", "max"),
         ratio=("ratio", "mean"),
     )
-    return found.assign(ratio=np.exp(found["ratio"])).rename_axis("solver").reset_index()
+    return lines.assign(ratio=np.exp(lines["ratio"])).rename_axis("solver").reset_index()

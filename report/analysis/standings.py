@@ -81,7 +81,7 @@ def geometric_mean(values: pd.Series[float]) -> float:
 
 
 def best_tolerances(cells: pd.DataFrame) -> pd.DataFrame:
-    """One cell per method and scene: of its tolerances the fastest within the limit, else the least wrong."""
+    """One cell per method and scene: the tolerance that is fastest within the limit, else least wrong."""
     missed = cells["verdict"] != "within"
     error = cells["displacement_error_mm"].where(missed, 0.0)
     order = cells.assign(missed=missed, error=error).sort_values(
@@ -118,9 +118,9 @@ def standings(cells: pd.DataFrame) -> pd.DataFrame:
         line |= {"cannot_be_judged": int(counts.get("cannot_be_judged", 0)), "no_answer": len(missed)}
         because = [f"{count} {status.replace('_', ' ')}" for status, count in Counter(missed).most_common()]
         line["no_answer_because"] = ", ".join(because)
-        line["worst_error_mm"] = mine["displacement_error_mm"].max()
-        own = slower[good["method"] == method].dropna()
-        line |= {"share": line["within"] / len(mine), "slower": geometric_mean(own) if len(own) else np.inf}
+        times = slower[good["method"] == method].dropna()
+        line["slower"] = geometric_mean(times) if len(times) else np.inf
+        line |= {"share": line["within"] / len(mine), "worst_error_mm": mine["displacement_error_mm"].max()}
         lines.append(line | {"peak_rss_mib": mine["peak_rss_mib"].max()})
     table = pd.DataFrame(lines)
     for n, of_size in cells.groupby("n"):
@@ -133,15 +133,15 @@ def standings(cells: pd.DataFrame) -> pd.DataFrame:
 def fastest_first(
     cells: pd.DataFrame, name: str = "label", seconds: str = "load_case_s", accuracy_mm: float | None = None
 ) -> pd.DataFrame:
-    """By the rule above: solver, form and `seconds` of each `name` that is good on every scene of
-    `cells`. accuracy_mm : if not given, the limit.
+    """Solver, form and `seconds` of each `name` that is good on every scene of `cells`, by the rule above.
+    accuracy_mm : None: the limit.
     """
     good = cells["verdict"] == "within" if accuracy_mm is None else accurate(cells, accuracy_mm)
-    known = cells[good & (cells[seconds] > 0)]
-    known = known[known.groupby(name)["scene"].transform("nunique") == cells["scene"].nunique()]
-    fastest = known.groupby([name, "scene"])[seconds].min()
-    means = fastest.groupby(level=0).agg(geometric_mean).rename("seconds")
-    lines = known.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "owner"]]
+    scenes = cells["scene"].nunique()
+    cells = cells[good & (cells[seconds] > 0)]
+    cells = cells[cells.groupby(name)["scene"].transform("nunique") == scenes]
+    means = cells.groupby([name, "scene"])[seconds].min().groupby(level=0).agg(geometric_mean)
+    lines = cells.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "owner"]]
     return lines.assign(seconds=means).sort_values("seconds", ignore_index=True)
 
 
@@ -183,7 +183,7 @@ def seconds_text(cell: Mapping[str, Any]) -> str:
 
 
 def of_fastest(owner: str, rows: pd.DataFrame, *names: str) -> pd.Series[float]:
-    """For each row the seconds of the fastest solver of that owner on its scene with as many threads: the
+    """The seconds of the fastest solver of that owner, for each row: on its scene, with as many threads, the
     least of the medians of any of the names.
     """
     medians = rows[rows["owner"] == owner].groupby(CELL, dropna=False)[[*names]].median().min(axis=1)
@@ -192,5 +192,5 @@ def of_fastest(owner: str, rows: pd.DataFrame, *names: str) -> pd.Series[float]:
 
 def spreads(rows: pd.DataFrame, by: list[str], names: list[str]) -> pd.DataFrame:
     """The medians over the groups, and with the endings _least and _most the ranges."""
-    found = rows.groupby(by, dropna=False)[names].agg(["median", "min", "max"])
-    return found.set_axis([f"{name}{end}" for name in names for end in ("", "_least", "_most")], axis=1)
+    figures = rows.groupby(by, dropna=False)[names].agg(["median", "min", "max"])
+    return figures.set_axis([f"{name}{end}" for name in names for end in ("", "_least", "_most")], axis=1)

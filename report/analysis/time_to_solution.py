@@ -1,5 +1,4 @@
-"""From the scene to the answer: the seconds of each stage on the way, in each form; and the exponents of
-growth, the slopes of straight lines in log–log.
+"""The seconds of each stage from the scene to the answer, in each form; exponents of growth with the size.
 
     sparse    model K̂, B, f̂                               then preparation (factors of K̂, …) and solve
     dual      condensation of the model to K, factors, Q   then preparation, solve, p and x
@@ -57,25 +56,25 @@ def roads(results: Results) -> pd.DataFrame:
 
 
 def _built(cell: Mapping[str, Any], problem: Mapping[str, Any]) -> dict[str, float]:
-    """Seconds of what stands before the solver's own preparation, and MiB of the dense matrices."""
-    found = {"model_s": 0.0, "K_s": 0.0, "factors_s": 0.0, "Q_s": 0.0, "stored_mib": 0.0}
+    """Seconds of the stages before the solver's own preparation, and MiB of the dense matrices."""
+    built = {"model_s": 0.0, "K_s": 0.0, "factors_s": 0.0, "Q_s": 0.0, "stored_mib": 0.0}
     if cell["form"] not in DENSE_FORMS:
-        return found | {"model_s": cell["model_s"]}
-    seconds, sizes = _known(problem.get("build_s")), _known(problem.get("stored_mib"))
+        return built | {"model_s": cell["model_s"]}
+    seconds, sizes = _numbers(problem.get("build_s")), _numbers(problem.get("stored_mib"))
     stages = [stage for stage in str(cell["stages"]).split() if stage in BUILDING]
     if not stages:  # a run that was stopped does not say
         stages = ["K", "factors", "Q"] if cell["form"] == "dual" or cell["owner"] != "library" else ["K"]
     for stage in stages:
         first, *others = (seconds.get(step, np.nan) for step in BUILDING[stage])
-        found[f"{stage}_s"] = first + float(np.nansum(others))  # springs between parts, if there are any
-        found["stored_mib"] += sizes.get(stage, np.nan)
-    return found
+        built[f"{stage}_s"] = first + float(np.nansum(others))  # springs between parts, if there are any
+        built["stored_mib"] += sizes.get(stage, np.nan)
+    return built
 
 
-def _known(part: object) -> dict[str, float]:
+def _numbers(part: object) -> dict[str, float]:
     """The numbers of a part of a scene's row."""
-    found = {name: as_number(value) for name, value in part.items()} if isinstance(part, dict) else {}
-    return {name: value for name, value in found.items() if value is not None}
+    items = part.items() if isinstance(part, dict) else ()
+    return {name: number for name, value in items if (number := as_number(value)) is not None}
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,14 @@ from .junction_maps import Array, grid_of
 
 
 def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure | None:
-    """Along both grid lines through the largest gap; None without contacts, or if they are on no grid."""
+    """The faces along both grid lines through the largest gap; None if the contacts are on no grid."""
     seen = around_worst(record, arrays)
     if seen is None or (grid := grid_of(seen.nodes)) is None:
         return None
-    pair, first, before = seen.pair, seen.first, arrays["gap_before"][seen.own]
+    pair, first, initial = seen.pair, seen.first, arrays["gap_before"][seen.contacts]
     x, y, place = grid
     row, column = divmod(int(place[seen.gap.argmax()]), len(x))
-    faces = {"before": (np.zeros(len(before)), before), "after": (first, first + seen.gap)}
+    faces = {"before": (np.zeros(len(initial)), initial), "after": (first, first + seen.gap)}
     lines = {
         f"along x at y = {significant(y[row])} mm": ("x, mm", x, row * len(x) + np.arange(len(x))),
         f"along y at x = {significant(x[column])} mm": ("y, mm", y, np.arange(len(y)) * len(x) + column),
@@ -46,28 +46,28 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
 
 @dataclass(frozen=True)
 class Faces:
-    """Of the contacts `own` of a pair: nodes (c, 2), mm; the gap left, and how far the face of the first part
-    has moved, (c,) mm.
+    """The `contacts` of a pair: nodes (c, 2), mm; the remaining gap, and the displacement of the first part's
+    face, (c,) mm.
     """
 
     pair: dict[str, Any]
-    own: slice
+    contacts: slice
     nodes: Array
     gap: Array
     first: Array
 
 
 def around_worst(record: dict[str, Any], arrays: dict[str, Array]) -> Faces | None:
-    """Of the pair with the largest gap; None without contacts that have coordinates."""
+    """The faces of the pair with the largest gap; None without contacts that have coordinates."""
     if not record["m"] or not {"contact_nodes", "A_data"} <= set(arrays):
         return None
     x, gap, nodes = (arrays[name] for name in ("x", "gap_after", "contact_nodes"))
     worst = int(gap.argmax())
     pair = next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
-    own = slice(pair["start"], pair["stop"])
+    contacts = slice(pair["start"], pair["stop"])
     parts = arrays["A_data"], arrays["A_indices"], arrays["A_indptr"]
-    first = sp.csc_array(parts, shape=(len(x), len(gap))).maximum(0)[:, own].T @ x
-    return Faces(pair, own, nodes[own], gap[own], np.asarray(first))
+    first = sp.csc_array(parts, shape=(len(x), len(gap))).maximum(0)[:, contacts].T @ x
+    return Faces(pair, contacts, nodes[contacts], gap[contacts], np.asarray(first))
 
 
 def _draw(axes: Axes, at: Array, faces: dict[str, list[Array]]) -> None:

@@ -1,5 +1,5 @@
-"""Lines of time against the active contacts or the size, with marks for runs without an answer in the limit;
-and a picture of cells: a row per method, a column per scene, in groups of scenes with a heading.
+"""Lines of time against the active contacts or the size, with marks for runs without an answer within the
+limit; and a picture of cells: a row per method, a column per scene, in groups of scenes with a heading.
 
 Groups that are too wide for one strip continue in a further one below.
 """
@@ -27,17 +27,11 @@ BESIDE: dict[str, Any] = {
     **{"textcoords": "offset points", "va": "center", "fontsize": 7.5, "color": "#666666"},
     "bbox": {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1},
 }
-OUTSIDE: dict[str, Any] = {
-    "marker": "x",
-    "markersize": 8,
-    "markeredgewidth": 1.8,
-    "linestyle": "",
-    "zorder": 5,
-}
+OUTSIDE: dict[str, Any] = {"linestyle": "", "marker": "x", "ms": 8, "mew": 1.8, "zorder": 5}
 HOLLOW: dict[str, Any] = {"linestyle": "", "markersize": 6, "markerfacecolor": "none", "zorder": 4}
-MOST_LIMITS = 3  # that are drawn; of more, each run has its own, at which its mark stands
+MOST_LIMITS = 3  # lines; if there are more limits, the mark of a run stands at its own
 STEP = 0.018  # of the axes: between marks that would coincide
-#: What marks mean, for captions.
+#: The meaning of the marks, for captions.
 MARKS = (
     "Crosses on a line: outside {limit}. Open triangles: stopped at the time limit; crosses at the upper "
     "edge: no answer for another reason."
@@ -98,16 +92,12 @@ def entries(cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> list[Line
         (late, "not finished in time", HOLLOW | {"marker": "^"}),
         (missed & ~late, "no answer", HOLLOW | {"marker": "x"}),
     ]
-    known = [
-        Line2D([], [], label=text, **(look | {"color": style.GREY}))
-        for here, text, look in marks
-        if here.any()
-    ]
-    return [*style.legend_entries(styles), *known]
+    looks = {text: look | {"color": style.GREY} for here, text, look in marks if here.any()}
+    return style.legend_entries(styles | looks)
 
 
 def yardstick(axes: Axes, heights: pd.Series[float], what: str) -> None:
-    """A grey line, by its place along the axis, with its name at its end."""
+    """Draw a grey line of heights by their place along the axis, with its name at its end."""
     axes.plot(heights.index, heights, **YARDSTICK)
     axes.annotate(what, (heights.index[-1], heights.iloc[-1]), (8, 0), **BESIDE)
 
@@ -122,7 +112,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Group:
-    """`columns` : their names by scene. about : what the names are, below the title."""
+    """Scenes side by side. columns : names by scene. about : their explanation, below the title."""
 
     title: str
     columns: dict[str, str]
@@ -136,7 +126,8 @@ def grid(
     height: float,
     widest: float,
 ) -> Figure:
-    """rows : the names of the methods, in order; those without a cell in a strip are left out of it.
+    """A picture of cells. rows : the names of the methods, in order; those without a cell in a strip are left
+    out of it.
 
     cells : by method and scene. height : of a row, in inches. widest : the most columns of a strip.
     """
@@ -166,12 +157,12 @@ def grid(
     for axes, strip, of_strip in zip(panels, strips, lines, strict=True):
         ticks: dict[float, str] = {}
         for group, middle in strip:
-            left = middle - len(group.columns) / 2 + 0.5
+            west = middle - len(group.columns) / 2 + 0.5
             for x, (scene, name) in enumerate(group.columns.items()):
-                ticks[left + x] = name
+                ticks[west + x] = name
                 for y, row in enumerate(of_strip):
                     if (row, scene) in cells:
-                        _draw(axes, (left + x, y), cells[row, scene], min(size, LARGEST - 0.5), room)
+                        _draw(axes, (west + x, y), cells[row, scene], min(size, LARGEST - 0.5), room)
             _heading(axes, group, middle, size)
         axes.set(xlim=(-0.1, width + 0.1), ylim=(len(of_strip) - 0.5, -0.5))
         axes.set_xticks([*ticks], [*ticks.values()], fontsize=tick, rotation=90 if upright else 0)

@@ -110,7 +110,7 @@ def read(directory: Path) -> Results:
     suite = _loaded(directory / "suite.toml", tomllib.loads, more)
     facts = [_loaded(file, json.loads, more) for file in sorted(directory.glob("machine*.json"))]
     machines = {str(fact.get("machine", "")): fact for fact in facts}
-    rows = frame(records, problems, suite)
+    rows = frame(records)
     left_out = len(records) - len(rows)
     return Results(directory, rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out)
 

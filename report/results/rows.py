@@ -22,12 +22,10 @@ MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
 LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 
-def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
+def frame(records: list[dict[str, Any]]) -> pd.DataFrame:
     """The rows with every field of the schema as a column of one type, the last of equal measurements.
 
     Flags are 1.0, 0.0 or missing. Adds `working_mib`, the memory that the solver needs on top of the data.
-    Missing n, m and active come from problems.jsonl, else from other rows of the scene; missing limits
-    from the suite.
     """
     rows = pd.DataFrame(records)
     for name in [*NUMBERS, *FLAGS]:
@@ -36,19 +34,8 @@ def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str
     for name in TEXTS:
         column = rows[name] if name in rows else pd.Series(None, index=rows.index, dtype=object)
         rows[name] = column.map(_text)
-    if "scene" in problems:
-        known = problems.drop_duplicates("scene", keep="last").set_index("scene")
-        for name in {"n", "m", "active"} & set(known):
-            rows[name] = rows[name].fillna(rows["scene"].map(known[name]))
-    for name in ("n", "m", "active"):
-        rows[name] = rows[name].fillna(rows.groupby("scene")[name].transform("max"))
-    rows["limit_asked_mm"] = rows["limit_asked_mm"].fillna(rows["limit_mm"])
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
-    options = {solver.get("name"): solver for solver in suite.get("solver", [])}
-    for name in ("time_limit_s", "memory_limit_mib"):
-        asked = rows["solver"].map(lambda s, key=name: options.get(s, {}).get(key, suite.get(key)))
-        rows[name] = rows[name].fillna(pd.to_numeric(asked, errors="coerce"))
     rows = rows.drop_duplicates([*CELL, "repeat", "case"], keep="last")
     return rows[_chosen(rows)].reset_index(drop=True)
 
@@ -64,8 +51,8 @@ def _chosen(rows: pd.DataFrame) -> pd.Series[bool]:
 
 
 def of_records(records: list[dict[str, Any]]) -> pd.DataFrame:
-    """Rows without the scenes and the suite that they belong to, with every text quoted."""
-    return frame(quoted(records), pd.DataFrame(), {})
+    """Rows as `frame` makes them, with every text quoted."""
+    return frame(quoted(records))
 
 
 def _text(value: object) -> str:

@@ -1,6 +1,4 @@
-"""Every measurement: one table per scene; then the machine, the code, the method of measurement, and what the
-columns mean.
-"""
+"""Every measurement, a table per scene; the machine, the code, the method, and the meaning of the columns."""
 
 from __future__ import annotations
 
@@ -34,14 +32,10 @@ def section(results: Results) -> Section | None:
         return None
     facts = {problem.get("scene"): problem for problem in records(results.problems)}
     blocks: list[Block] = []
-    for n in [*results.sizes, None]:
-        of_size = results.cells[results.cells["n"].isna() if n is None else results.cells["n"] == n]
-        if len(of_size):
-            blocks.append(Text("### Size not recorded" if n is None else f"### n = {n}"))
-        ordered = of_size.sort_values(["active", "scene"])
-        blocks += [
-            _table(str(scene), of, facts.get(scene, {})) for scene, of in ordered.groupby("scene", sort=False)
-        ]
+    for n, of_size in results.cells.sort_values(["active", "scene"]).groupby("n"):
+        blocks.append(Text(f"### n = {n:.0f}"))
+        scenes = of_size.groupby("scene", sort=False)
+        blocks += [_table(str(scene), cells, facts.get(scene, {})) for scene, cells in scenes]
     return Section("Every solver on every scene", blocks)
 
 
@@ -61,10 +55,10 @@ def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any]) -> Table
     ]
     active, m = cells["active"].max(), cells["m"].max()
     share = f" ({100 * active / m:.0f} % of {m:.0f})" if active == active and m > 0 else ""
-    known = [str(problem.get("title") or "")]
-    known += [f"{active:.0f} active contacts{share}"] if active == active else []
-    known += [f"cond(K) = {power(problem['cond_K'])}"] if as_number(problem.get("cond_K")) else []
-    title = f"**Scene {scene}**: {', '.join(filter(None, known))}"
+    facts = [str(problem.get("title") or "")]
+    facts += [f"{active:.0f} active contacts{share}"] if active == active else []
+    facts += [f"cond(K) = {power(problem['cond_K'])}"] if as_number(problem.get("cond_K")) else []
+    title = f"**Scene {scene}**: {', '.join(filter(None, facts))}"
     return Table(f"scene-{file_name(scene)}", title, ordered[["label", *FIGURES, "key"]], columns)
 
 

@@ -92,13 +92,13 @@ def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
         blocks.append(Table("fasteners", "*The force in each fastener.*", forces, columns))
     pairs = []
     for pair in record["pairs"]:
-        own = slice(pair["start"], pair["stop"])
-        before, after, force = (arrays[name][own] for name in ("gap_before", "gap_after", "lam"))
-        line = {"contact": pair_name(pair), "before": before, "after": after, "force_N": np.nansum(force)}
-        pairs.append(line | {"closed": f"{(force > 0).sum()} of {len(force)}"})
+        here = slice(pair["start"], pair["stop"])
+        line = {name: arrays[name][here] for name in ("gap_before", "gap_after", "lam")}
+        closed = f"{(line['lam'] > 0).sum()} of {len(line['lam'])}"
+        pairs.append(line | {"contact": pair_name(pair), "closed": closed, "force_N": np.nansum(line["lam"])})
     if pairs:
-        columns = [word("contact", "contact"), _range("gap before, mm", "before")]
-        columns += [_range("gap after, mm", "after"), word("closed", "closed")]
+        columns = [word("contact", "contact"), _range("gap before, mm", "gap_before")]
+        columns += [_range("gap after, mm", "gap_after"), word("closed", "closed")]
         columns.append(number("sum of contact forces, N", "force_N"))
         blocks.append(
             Table("", "*The contacts*, from the smallest to the largest gap.", pd.DataFrame(pairs), columns)
@@ -140,18 +140,18 @@ def grid_with_fields(
 ) -> tuple[Array, list[tuple[str, Any]], dict[str, Array]]:
     """Points (n, 3), cells and point data for meshio."""
     nodes, n = arrays["nodes"], len(arrays["nodes"])
-    force, before, after = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)
+    force, initial, remaining = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)
     columns = np.repeat(np.arange(record["m"]), np.diff(arrays["A_indptr"]))
     np.add.at(force, arrays["A_indices"], arrays["A_data"] * np.nan_to_num(arrays["lam"])[columns])
-    np.fmin.at(before, arrays["A_indices"], arrays["gap_before"][columns])
-    np.fmin.at(after, arrays["A_indices"], arrays["gap_after"][columns])
+    np.fmin.at(initial, arrays["A_indices"], arrays["gap_before"][columns])
+    np.fmin.at(remaining, arrays["A_indices"], arrays["gap_after"][columns])
     part = np.concatenate([np.full(p["stop"] - p["start"], k) for k, p in enumerate(record["parts"])])
     data = {
         "displacement_mm": np.column_stack([np.zeros((n, 2)), arrays["x"]]),
         "part": part.astype(float),
         "contact_force_N": force,
-        "gap_before_mm": before,
-        "gap_after_mm": after,
+        "gap_before_mm": initial,
+        "gap_after_mm": remaining,
     }
     points = np.column_stack([nodes, np.zeros(n)])
     blocks = [_cells(nodes[p["start"] : p["stop"]], p["start"]) for p in record["parts"]]

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
-from report.document.escape import csv_frame
 from report.document.numbers import significant, whole
 from report.figures.answer_maps import gap_maps
 from report.page.answer_page_data import two_answers_data
@@ -52,27 +51,26 @@ def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
         columns = [word("kind", "kind"), word("contact", "contact"), number("x, mm", "x_mm")]
         columns += [number("y, mm", "y_mm"), *(number(side, f"{side}_N") for side in SIDES)]
         blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", forces, columns))
-    csv_frame(_contacts(answers)).to_csv(directory / "contacts.csv", index=False)
     title = f"{names[0]} and {names[1]}"
     write_page(directory / "index.html", title, two_answers_data(answers))
-    section = Section("Two scenes on one junction", blocks)
-    return written(directory / "comparison.md", title, [section]), pairs
+    sections, files = [Section("Two scenes on one junction", blocks)], {"contacts": _contacts(answers)}
+    return written(directory / "comparison.md", title, sections, files=files), pairs
 
 
 def _pair(pair: dict[str, Any], one: dict[str, Array], other: dict[str, Array]) -> dict[str, Any]:
     """The figures of a pair of parts in both scenes."""
-    own = slice(pair["start"], pair["stop"])
+    here = slice(pair["start"], pair["stop"])
     line: dict[str, Any] = {"contact": pair_name(pair)}
     for side, arrays in zip(SIDES, (one, other), strict=True):
-        gap, force = arrays["gap_after"][own], arrays["lam"][own]
+        gap, force = arrays["gap_after"][here], arrays["lam"][here]
         line |= {
-            f"initial_{side}_mm": arrays["gap_before"][own].max(),
+            f"initial_{side}_mm": arrays["gap_before"][here].max(),
             f"largest_{side}_mm": gap.max(),
             f"mean_{side}_mm": gap.mean(),
             f"closed_{side}": int((force > 0).sum()),
             f"force_{side}_N": float(np.nansum(force)),
         }
-    change = other["gap_after"][own] - one["gap_after"][own]
+    change = other["gap_after"][here] - one["gap_after"][here]
     closed, opened = (np.maximum(0.0, most) + 0.0 for most in (-change.min(), change.max()))  # no -0
     return line | {"most_closed_mm": closed, "most_opened_mm": opened}
 
