@@ -1,1 +1,1 @@
-"""The interactive page: one HTML file that needs no network, made from the same rows as the report."""
+"""The interactive page: one HTML file that needs no network, made from the same data as the report."""

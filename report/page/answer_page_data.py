@@ -1,4 +1,4 @@
-"""The answer of one scene for the page."""
+"""Collects what the page of an answer, or of two answers on one junction, shows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CODE = ("machine", "commit", "clean", "recorded_at")
 
 
 def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
-    """The page of one answer. record, arrays : of solution.json and solution.npz."""
+    """The data of the page of one answer. record, arrays : from solution.json and solution.npz."""
     forces = [
         [kind, contact, *map(significant, numbers)]
         for kind, contact, *numbers in fasteners(record).itertuples(index=False)
@@ -56,8 +56,8 @@ def facts(record: Data) -> list[list[str]]:
 
 
 def headline(record: Data, arrays: dict[str, Array]) -> Data:
-    """What the reader asks first: whether a gap is larger than allowed, if that was asked, and how large the
-    largest is and where. kind : "pass", "fail" or "" if neither can be said.
+    """The first sentence of an answer: whether a gap is larger than the limit, if there is one, and how large
+    the largest gap is and where. kind : "pass", "fail", or "" if neither can be said.
     """
     if not record["m"]:
         return {"kind": "pass" if "allowed_gap" in record else "", "text": "The scene has no contact."}
@@ -86,7 +86,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
 
 
 def two_answers_data(answers: list[Answer]) -> Data:
-    """The page of two answers on one junction."""
+    """The data of the page of two answers on one junction."""
     records = [record for record, _ in answers]
     named = [f"{record['title']}, {record['method']}" for record in records]
     maps = two_answers_maps(records[0], [arrays for _, arrays in answers])
@@ -95,6 +95,7 @@ def two_answers_data(answers: list[Answer]) -> Data:
 
 
 def _with_maps(records: list[Data], lines: list[list[str]], maps: Data) -> Data:
+    """The data of a page with gap maps and a table of facts."""
     return {
         "banner": _banner(records),
         "tables": [{"title": "Facts", "summary": "", "heads": [], "lines": lines}],

@@ -68,9 +68,9 @@ def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array]) -> 
     page = _empty()
     marks = np.array([point for points in record.get("marks", {}).values() for point in points])
     for pair in record["pairs"] if "contact_nodes" in arrays else ():
-        own = slice(pair["start"], pair["stop"])
-        of_pair = {name: values[own] for name, values in fields.items()}
-        _added(page, pair_name(pair), arrays["contact_nodes"][own], of_pair, marks)
+        contacts = slice(pair["start"], pair["stop"])
+        of_pair = {name: values[contacts] for name, values in fields.items()}
+        _added(page, pair_name(pair), arrays["contact_nodes"][contacts], of_pair, marks)
     return page
 
 

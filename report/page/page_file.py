@@ -64,14 +64,16 @@ def entry(name: str, label: str, views: str) -> Data:
 
 
 def _named(directory: Path) -> str:
-    """The directory from here, or its name alone if it lies elsewhere."""
+    """The directory relative to the current one, or its name alone if it lies elsewhere."""
     whole = directory.resolve()
     near = whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else Path(whole.name)
     return str(quoted(near.as_posix()))
 
 
 def banner(rows: pd.DataFrame, **more: object) -> Data:
-    """rows : with `machine`, `commit`, `clean` and `recorded_at`. more : `counts`, `versions`, `warnings`, or
+    """The machine, code and dates of some rows, as the top of the page shows them.
+
+    rows : with `machine`, `commit`, `clean` and `recorded_at`. more : `counts`, `versions`, `warnings`, or
     other words for any of the banner's lines.
     """
     rows = rows.assign(clean=rows["clean"].astype(float))  # true, false or not known
@@ -88,6 +90,7 @@ def banner(rows: pd.DataFrame, **more: object) -> Data:
 
 
 def minute(time: str) -> str:
+    """'2026-01-02 03:04 UTC'."""
     return f"{time[:16].replace('T', ' ')} UTC"
 
 
@@ -110,5 +113,5 @@ def packed(values: Array) -> str:
 
 
 def exact(values: Array) -> str:
-    """The same with all digits of a float32, for coordinates."""
+    """An array with all digits of a float32, for coordinates: base64 of its deflated bytes."""
     return b64encode(zlib.compress(np.ascontiguousarray(values, "<f4").tobytes(), 9)).decode()

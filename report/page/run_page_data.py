@@ -1,4 +1,4 @@
-"""The rows of a results directory for the page: its cells with all that distinguishes and judges them.
+"""Collects what the page of a results directory shows: its cells with all that distinguishes and judges them.
 
 The page gives the verdicts itself, for any limit L, from the cell's error and reference error bound:
 
@@ -24,23 +24,15 @@ from report.document.numbers import listed
 from report.figures.style import line_styles
 from report.page.contact_maps import hover_names, map_controls, scene_maps
 from report.page.page_figures import PANELS, as_items, map_figure, precision_figure
-from report.page.page_file import Data, banner, choice, column
+from report.page.page_file import Data, banner, column
+from report.page.run_page_controls import limit_slider, row_filters, ways_to_show
 from report.results.reader import Results
 from report.results.rows import CELL, in_order
 
 TEXTS = (
     *("scene", "method", "label", "solver", "owner", "form", "variant", "status", "verdict", "machine"),
-    *(
-        "title",
-        "ladder",
-        "contact",
-        "message",
-        "solver_version",
-        "solver_code",
-        "commit",
-        "recorded_at",
-        "key",
-    ),
+    *("title", "ladder", "contact", "message", "solver_version", "solver_code"),
+    *("commit", "recorded_at", "key"),
 )
 NUMBERS = (
     *("n", "m", "active", "tolerance", "threads", "repeats", "iterations", "inner_iterations"),
@@ -48,31 +40,6 @@ NUMBERS = (
     *("displacement_error_mm", "reached_mm", "bound_mm", "least_mm", "backward_error", "contact_mismatch"),
 )
 LIMIT_MM = 1e-7  # of rows that do not say
-JUDGED = "ladders matrix precision solver"  # the views with a limit and filters
-METRICS = {
-    "load_case_s": "seconds per load case",
-    "total_s": "seconds with preparation",
-    "scene_s": "seconds from the scene",
-    "over": "error / limit",
-}
-VERDICTS = {
-    "within": "within",
-    "outside": "outside the limit",
-    "cannot_be_judged": "cannot be judged",
-    "no_answer": "no answer",
-}
-FILTERS = {
-    "machine": "machine",
-    "n": "size n",
-    "contact": "contact",
-    "form": "form",
-    "threads": "threads",
-    "owner": "solvers",
-    "tolerance": "tolerance",
-    "ladder": "ladder",
-    "status": "reported",
-}
-ALL = ("", "all")
 CONTACT = {"up to 10 %": 0.1, "10 to 50 %": 0.5, "above 50 %": 1.0}
 #: By matplotlib's marker, Bokeh's of about the same shape, its turn, and a character like it.
 MARKERS = {
@@ -115,11 +82,11 @@ OF_ONE_SOLVER = {
 def run_data(results: Results) -> Data:
     """The rows of a results directory, with the views, lists and figures of their page."""
     cells, scenes, maps = _cells(results), _scenes(results), scene_maps(results)
-    asked = cells["limit_asked_mm"].dropna()
-    ladders = any(scene["ladder"] for scene in scenes)
+    limits = cells["limit_asked_mm"].dropna().mode()
+    ladders = [scene for scene in scenes if scene["ladder"]]
     method_of = dict(zip(cells["label"], cells["method"], strict=True))
     methods = list(dict.fromkeys(method_of[label] for label in (in_order(cells) if len(cells) else [])))
-    filters = _filters(cells)
+    filters = row_filters(cells)
     views = {
         "matrix": "Matrix",
         "precision": "Work and precision",
@@ -140,9 +107,13 @@ def run_data(results: Results) -> Data:
     return {
         "banner": _banner(results),
         "views": list(views.items()),
-        "limit": _slider(float(asked.mode().iloc[0]) if len(asked) else LIMIT_MM),
-        "controls": [*_ways_to_show(cells, scenes, methods), *filters, *map_controls(maps)],
-        "filters": [each["name"] for each in filters],
+        "limit": limit_slider(float(limits.iloc[0]) if len(limits) else LIMIT_MM),
+        "controls": [
+            *ways_to_show(cells, len(ladders) == len(scenes), methods),
+            *filters,
+            *map_controls(maps),
+        ],
+        "filters": [control["name"] for control in filters],
         "methods": methods,
         "columns": list(OF_ONE_SOLVER.items()),
         "styles": {name: _look(style) for name, style in line_styles(cells).items()},
@@ -156,43 +127,11 @@ def run_data(results: Results) -> Data:
     }
 
 
-def _ways_to_show(cells: pd.DataFrame, scenes: list[Data], methods: list[str]) -> list[Data]:
-    metrics = {name: text for name, text in METRICS.items() if name == "over" or cells[name].notna().any()}
-    if all(scene["ladder"] for scene in scenes):
-        metrics = {"over": metrics["over"]} | metrics
-    named = [("", "–"), *((method, method) for method in methods)]
-    lines = [("method", "best tolerance only"), ("label", "every tolerance")]
-    return [
-        choice("metric", "show", metrics.items(), JUDGED),
-        choice("lines", "lines", lines, "matrix ladders"),
-        choice("base", "ratios to", named, "matrix"),
-        choice("solver", "solver", named, "solver precision"),
-    ]
-
-
 def _range(cells: pd.DataFrame, names: list[str]) -> tuple[float, float]:
     """A range, with a margin, of positive values in some columns."""
     values = cells[names].to_numpy(dtype=float)
     values = values[values > 0]
     return (float(values.min()) / 2, float(values.max()) * 2) if len(values) else (0.1, 10.0)
-
-
-def _slider(limit_mm: float) -> Data:
-    """The slider of the limit, from about 1e-3 to 1e-12 mm, one of whose steps is the limit of the rows."""
-    exponent = -math.log10(limit_mm)
-    return {"value": exponent, "least": 3 + exponent % 0.5}
-
-
-def _filters(cells: pd.DataFrame) -> list[Data]:
-    """The lists that leave out cells. Machines are never mixed."""
-    filters = [choice("judged", "verdict", [ALL, *VERDICTS.items()], JUDGED)]
-    for name, label in FILTERS.items():
-        values = sorted(set(cells[name].dropna()) - {""})
-        texts = [f"{value:.10g}" if isinstance(value, float) else str(value) for value in values]
-        options = list(zip(texts, texts, strict=True))
-        if len(options) > 1:
-            filters.append(choice(name, label, options if name == "machine" else [ALL, *options], JUDGED))
-    return filters
 
 
 def _cells(results: Results) -> pd.DataFrame:
@@ -206,12 +145,12 @@ def _cells(results: Results) -> pd.DataFrame:
     else:
         cells = cells.assign(scene_s=float("nan"))
     eased = cells["scene"].str.startswith(LADDERS) & (cells["limit_mm"] > cells["limit_asked_mm"])
-    known = cells["displacement_error_mm"].notna()
+    answered = cells["displacement_error_mm"].notna()
     titles = {problem.get("scene"): str(problem.get("title") or "") for problem in records(results.problems)}
     share = pd.cut(cells["active"] / cells["m"], [-1.0, *CONTACT.values()], labels=list(CONTACT))
     cells = cells.assign(
         least_mm=cells["limit_mm"].where(eased),
-        reached_mm=cells[["displacement_error_mm", "bound_mm"]].max(axis=1).clip(*DRAWN_MM).where(known),
+        reached_mm=cells[["displacement_error_mm", "bound_mm"]].max(axis=1).clip(*DRAWN_MM).where(answered),
         total_s=cells["load_case_s"] + cells["once_s"].fillna(0.0),
         ladder=cells["scene"].map(_ladder),
         title=cells["scene"].map(lambda scene: titles.get(scene, "")),
