@@ -14,7 +14,8 @@ from hostile_texts import HOSTILE, MADE
 from synthetic_results import everything, no_answer, results, row, write_rows
 from synthetic_series import made as made_series
 
-from report.page import answer_page_data, contact_maps
+from report.figures import style
+from report.page import answer_page_data, contact_maps, run_page_data
 from report.page.answer_page_data import headline
 from report.page.page_file import packed, write
 from report.page.run_page_data import run_data
@@ -202,6 +203,10 @@ def test_the_cells_of_a_map_meet_half_way_between_the_contacts() -> None:
     np.testing.assert_array_equal(cells["top"][::3], [5.0, 10.0])
     off_grid = contact_maps._cells(nodes[:5])
     np.testing.assert_allclose(off_grid["right"] - off_grid["left"], np.sqrt(400 / 5))
+
+
+def test_every_marker_of_the_report_has_one_on_the_page() -> None:
+    assert {marker for _, marker in [*style.FIXED.values(), *style.SPARE]} <= set(run_page_data.MARKERS)
 
 
 def test_a_directory_without_an_answer_has_a_page(tmp_path: Path) -> None:
