@@ -193,7 +193,7 @@ def orders(search: Search, best: Step) -> list[dict[str, Any]]:
     def prefixes(order: Sequence[Place]) -> list[Step]:
         return search.wholes([tuple(sorted(order[:k])) for k in range(len(order) + 1)])
 
-    found = {
+    by_order = {
         "least needed last": [best, *search.removal(best, {})][::-1],
         "left to right": prefixes(best.plan),
         "centre outwards": prefixes(
@@ -202,7 +202,7 @@ def orders(search: Search, best: Step) -> list[dict[str, Any]]:
     }
     return [
         {"order": name, "mean_mm": float(np.mean(gaps)), "largest_mm": max(gaps), "before_mm": gaps[0]}
-        for name, steps in found.items()
+        for name, steps in by_order.items()
         for gaps in [[step.gap_mm for step in steps]]
     ]
 

@@ -69,16 +69,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser("python -m studies.publish", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="SUITE", help=f"only these of: {', '.join(NAMES)}")
     parser.add_argument("--index", action="store_true", help="only write the index")
-    asked = parser.parse_args(arguments)
-    if unknown := sorted(set(asked.names) - set(NAMES)):
+    chosen = parser.parse_args(arguments)
+    if unknown := sorted(set(chosen.names) - set(NAMES)):
         parser.error(f"unknown: {', '.join(unknown)}")
     failed: list[str] = []
-    if not asked.index:
+    if not chosen.index:
         digits, clean = commit()
         if not clean or Path.cwd().resolve() != ROOT:
             parser.error(f"must run in {ROOT}, a clone whose code is as committed")
         try:
-            failed = measure([name for name in NAMES if not asked.names or name in asked.names], digits)
+            failed = measure([name for name in NAMES if not chosen.names or name in chosen.names], digits)
         except KeyboardInterrupt:
             return INTERRUPTED
     print(f"Index: {write_index(PUBLISHED)}")
@@ -172,9 +172,9 @@ def _unwanted(directory: Path) -> Iterator[Path]:
 
 def write_index(folder: Path) -> Path:
     """Write FOLDER/index.md, a table of the suites in it; returns its path."""
-    found = {name: rows for name in NAMES if (rows := rows_of(folder / name))}
+    published = {name: rows for name in NAMES if (rows := rows_of(folder / name))}
     lines = []
-    for name, rows in found.items():
+    for name, rows in published.items():
         taken, verdicts = minutes(rows), Counter(row["verdict"] for row in rows)
         days = sorted({str(row["recorded_at"])[:DAY] for row in rows if row.get("recorded_at")})
         title, study = _title(folder / name), f"{name}/study/study.md"
@@ -184,7 +184,9 @@ def write_index(folder: Path) -> Path:
         line |= {"measured": " to ".join(dict.fromkeys([*days[:1], *days[-1:]]))}
         line |= {"minutes": "–" if taken is None else f"{taken:.0f}", "commit": _commits(rows)}
         lines.append(line | {"rows": len(rows)} | {verdict: verdicts[verdict] for verdict in VERDICTS})
-    machines = sorted({str(row["machine"]) for rows in found.values() for row in rows if row.get("machine")})
+    machines = sorted(
+        {str(row["machine"]) for rows in published.values() for row in rows if row.get("machine")}
+    )
     text = (
         f"# Published results\n\nMeasured on {', '.join(machines)}. `python -m harness report DIRECTORY` "
         "draws the report of a suite from its rows.\n\n"

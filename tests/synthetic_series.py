@@ -18,7 +18,6 @@ def made(directory: Path, swept: bool = False, name: str = "made") -> np.ndarray
     gaps = rng.gamma(1.0, 0.1, (CASES, M)).astype(np.float32)
     gaps[:, 0] = 0.0
     facts = {"scene": name, "title": name, "cases": CASES, "threads": 1, "machine": name}
-    series_file.create(directory)
     series_file.write_fact(directory, "series", json.dumps({"identity": IDENTITY, **facts}))
     cases = []
     for case in rng.permutation(CASES):

@@ -1,4 +1,4 @@
-"""Outputs that are written beside their place and moved there when they are whole."""
+"""Writes outputs beside their place and moves them there when they are whole."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _listed(folder: Path) -> set[Path]:
 
 
 def refuse_unwritable(out: Path, inputs: Sequence[Path] = (), option: str = "--out") -> None:
-    """Raise InputError if `out` may not be written, or is one of the inputs: to be asked before long work."""
+    """Raise InputError, before long work, if `out` may not be written or is one of the inputs."""
     refuse_inputs([out], inputs, option)
     target = resolved(out)
     if not target.name:
@@ -85,13 +85,13 @@ def _unwritable(option: str, out: Path, why: str) -> InputError:
 
 def refuse_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path]) -> None:
     """Raise InputError if an option's file may not be written, is one of the inputs, or another's file."""
-    before: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for option, path in outputs.items():
         if path is not None:
             refuse_unwritable(path, inputs, option)
-            for other in (name for name, earlier in before.items() if _is_same(path, earlier)):
+            for other in (name for name, earlier in files.items() if _is_same(path, earlier)):
                 raise InputError.one(option, "path", str(path), f"is the file of {other}: name another")
-            before[option] = path
+            files[option] = path
 
 
 def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path], option: str = "--out") -> None:

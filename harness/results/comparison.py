@@ -1,11 +1,11 @@
-"""The rows of the two sides of a comparison, whether they can be compared, and the digits that one lost.
+"""Reads the rows of the two sides of a comparison, refuses those of other problems, and counts lost digits.
 
-Digits lost between two errors of the same measurement:
+The digits lost between two errors of the same measurement are
 
     log10( max(after, floor) / max(before, floor) ),    floor = max(bound, NEGLIGIBLE · limit)
 
-bound is the error bound of the reference: below it, a difference says nothing of the answers. What lies a
-million times below the limit is not worth a difference either.
+bound is the error bound of the reference: below it, a difference says nothing about the answers. Neither does
+a difference between errors a million times below the limit.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from problems.errors import Fault, InputError
 from .records import MEASUREMENTS, Row, read
 from .row_validation import MAX_FAULTS, refuse_wrong_kinds
 
-#: What a comparison needs of a row.
+#: The fields that a comparison needs.
 NEEDED = ("scene", "solver", "form", "tolerance", "status", "verdict")
 SAME_LIMIT = 1e-3  # relative; on a rung of a ladder, the limit is computed
 NEGLIGIBLE = 1e-6
@@ -65,7 +65,7 @@ def read_side(name: str, key: str | None = None) -> Side:
 
 
 def measurement(row: Row) -> str:
-    """What a row is of, its repeat apart: '4386/0107 ipm dual tol=1e-09 threads=2'."""
+    """The measurement of a row, without its repeat: '4386/0107 ipm dual tol=1e-09 threads=2'."""
     words = [row["scene"], row["solver"], row["form"], row.get("variant"), f"tol={row['tolerance']:g}"]
     asked = {"threads": row.get("threads_asked"), "batched": row.get("batched"), "case": row.get("case")}
     words += [f"{word}={value}" for word, value in asked.items() if value is not None]
@@ -73,8 +73,9 @@ def measurement(row: Row) -> str:
 
 
 def refuse_incomparable(old: Side, new: Side) -> None:
-    """Raise Incomparable, naming each scene or measurement, if both sides have nothing in common, or if a
-    scene is another problem, or a limit another one.
+    """Raise Incomparable if both sides have no measurement in common, or differ in a problem or a limit.
+
+    Each such scene or measurement is named.
     """
     before = {measurement(row): row for row in old.rows}
     shared = [(before[name], row) for row in new.rows if (name := measurement(row)) in before]
@@ -90,7 +91,7 @@ def refuse_incomparable(old: Side, new: Side) -> None:
 
 
 def _differences(old: Side, new: Side, one: Row, other: Row) -> Iterator[Fault]:
-    """Of the problem or of the limit, between two rows of one measurement."""
+    """The differences of the problem or of the limit between two rows of one measurement."""
     for name in ("scene_key", "n", "m"):
         values = one.get(name), other.get(name)
         if None not in values and values[0] != values[1]:
@@ -109,5 +110,5 @@ def floor_mm(bound_mm: float, limit_mm: float) -> float:
 
 
 def digits_lost(before_mm: float, after_mm: float, floor: float) -> float:
-    """Negative if digits were gained. floor : positive."""
+    """The digits lost, negative if digits were gained. floor : positive."""
     return log10(max(after_mm, floor) / max(before_mm, floor))

@@ -1,4 +1,4 @@
-"""What made a row: the machine, its memory and versions; the code, its commit and whether it had changes."""
+"""The origin of a row: the machine, its memory and versions; the commit of the code, and its changes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .schema import Provenance
 PACKAGES = ("rivetbench", "numpy", "scipy", "qpsolvers", "osqp", "clarabel", "proxsuite", "piqp")
 #: The folder that holds the project's packages.
 ROOT = Path(__file__).resolve().parents[2]
-#: What can change a row; what only shows rows, and results that are written meanwhile, are not part of it.
+#: The code that can change a row; the report only shows rows.
 CODE = ("problems", "solvers", "harness", "pyproject.toml")
 #: Tracked in a work tree of this project; a tree that merely contains an installed copy tracks neither.
 OWN_FILES = ("pyproject.toml", "harness/results/provenance.py")
@@ -35,9 +35,9 @@ def provenance() -> Provenance:
 def commit() -> tuple[str, bool | None]:
     """The commit of the code in these packages, and whether the code is as committed.
 
-    In a git work tree of the project, the 40 hexadecimal digits of the last commit that changed CODE, so that
-    one to documents or results is no other code, and whether CODE has no changes; an untracked file is one,
-    because plug-ins are found by discovery. Otherwise, or if git is missing, the version and None, not known.
+    In a git work tree of the project: the 40 hexadecimal digits of the last commit that touched CODE (commits
+    to documents or results do not count), and whether CODE has no changes. An untracked file is a change,
+    because plug-ins are found by discovery. Without such a work tree or git: the version, and None.
     """
     return _of_work_tree() or (__version__, None)
 
@@ -54,7 +54,7 @@ def _of_work_tree() -> tuple[str, bool | None] | None:
 
 
 def _git(*arguments: str) -> str | None:
-    """What git prints about ROOT; None if it is not installed or fails."""
+    """The output of git about ROOT; None if git is not installed or fails."""
     environment = {name: value for name, value in os.environ.items() if name not in HOOK_VARIABLES}
     try:
         done = subprocess.run(

@@ -1,4 +1,4 @@
-"""The rows of a file checked on reading: a file may hold anything."""
+"""Checks the rows of a file on reading: a file may hold anything."""
 
 from __future__ import annotations
 

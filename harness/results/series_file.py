@@ -47,7 +47,7 @@ AGAIN = "delete it, and run the same `series` command again"
 
 
 class Identity(BaseModel):
-    """What must be the same for cases to belong to one series, as far as others read it."""
+    """The facts that all cases of a series share, as far as others read them."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -95,14 +95,10 @@ def _begun(path: Path) -> bool:
     return path.exists() and (not path.is_file() or path.stat().st_size > 0)
 
 
-def create(directory: Path) -> None:
-    """Make the tables, unless they are there."""
+def write_fact(directory: Path, name: str, value: str | bytes) -> None:
+    """Write or replace a fact; the first one makes the tables."""
     with connected(directory) as connection:
         connection.executescript(TABLES)
-
-
-def write_fact(directory: Path, name: str, value: str | bytes) -> None:
-    with connected(directory) as connection:
         connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", (name, value))
 
 
@@ -117,16 +113,16 @@ def append(directory: Path, cases: Iterable[tuple[Row, Gaps | None]]) -> None:
 
 
 def read_facts(directory: Path) -> dict[str, Any] | None:
-    """The value of `series`; None if there is none yet. Raises InputError if it is not what was written."""
+    """The value of `series`; None if there is none yet. Raises InputError if it is damaged."""
     path = directory / SERIES
     if not _begun(path):
         return None
     with connected(directory) as connection:
-        found = connection.execute("SELECT value FROM facts WHERE name = 'series'").fetchone()
-    if found is None:
+        fact = connection.execute("SELECT value FROM facts WHERE name = 'series'").fetchone()
+    if fact is None:
         return None
     try:
-        content: dict[str, Any] = records.parsed(found[0])
+        content: dict[str, Any] = records.parsed(fact[0])
         Facts.model_validate(content)
     except ValidationError as error:
         raise InputError(list(validation_faults(path, Facts, error))) from error
@@ -168,14 +164,14 @@ def drop_gaps(directory: Path) -> None:
 
 
 def read_contacts(directory: Path) -> dict[str, NDArray[Any]]:
-    """The same. Raises InputError if they are not what was written."""
+    """The arrays of `write_contacts`. Raises InputError if they are damaged."""
     path = directory / SERIES
     with connected(directory) as connection:
-        found = connection.execute("SELECT value FROM facts WHERE name = 'contacts'").fetchone()
-    if found is None:
+        fact = connection.execute("SELECT value FROM facts WHERE name = 'contacts'").fetchone()
+    if fact is None:
         raise InputError.one(path, "contacts", None, AGAIN)
     try:
-        arrays = records.read_arrays(io.BytesIO(found[0]))
+        arrays = records.read_arrays(io.BytesIO(fact[0]))
         int(arrays["m"])
     except (ValueError, TypeError, KeyError) as error:
         raise InputError.one(path, "contacts", str(error), AGAIN) from error
@@ -191,19 +187,19 @@ class StoredGaps:
     def __getitem__(self, key: Any) -> Gaps:
         numbers, contacts = key if isinstance(key, tuple) else (key, slice(None))
         start, stop, step = contacts.indices(self.m)
-        asked = np.atleast_1d(numbers).tolist()
-        found = np.empty((len(asked), len(range(start, stop, step))), np.float32)
+        cases = np.atleast_1d(numbers).tolist()
+        gaps = np.empty((len(cases), len(range(start, stop, step))), np.float32)
         part = "SELECT substr(gap, ?, ?) FROM cases WHERE number = ?"
         where = 1 + GAP.itemsize * start, GAP.itemsize * (stop - start)
         with connected(self.directory) as connection:
-            for k, number in enumerate(asked):
+            for k, number in enumerate(cases):
                 try:
                     (blob,) = connection.execute(part, (*where, number)).fetchone()
-                    found[k] = np.frombuffer(blob, GAP)[::step]
+                    gaps[k] = np.frombuffer(blob, GAP)[::step]
                 except (TypeError, ValueError) as error:
                     path = self.directory / SERIES
                     raise InputError.one(path, f"gaps of case {number}", str(error), AGAIN) from error
-        return found if np.ndim(numbers) else found[0]
+        return gaps if np.ndim(numbers) else gaps[0]
 
 
 def refuse_damaged(directory: Path) -> None:

@@ -121,7 +121,6 @@ def record_contacts(job: Job, directory: Path) -> None:
 
 def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> None:
     """Write identity and facts. Raises InputError, naming each difference, if another series is there."""
-    series_file.create(directory)
     before = series_file.read_facts(directory)
     if before is not None:
         records.refuse_other(directory / SERIES, before["identity"], identity)

@@ -71,9 +71,9 @@ def section(study: Study) -> Section:
 
 def holds(cases: Iterable[bool | None]) -> str:
     """'yes', 'no' or '2 of 3' cases, and how many are open; 'open' or 'not measured' if none is decided."""
-    found = list(cases)
-    known = [met for met in found if met is not None]
-    if not known:
-        return "open" if found else "not measured"
-    word = "yes" if all(known) else f"{sum(known)} of {len(known)}" if any(known) else "no"
-    return word + (f", {len(found) - len(known)} open" if len(known) < len(found) else "")
+    outcomes = list(cases)
+    decided = [met for met in outcomes if met is not None]
+    if not decided:
+        return "open" if outcomes else "not measured"
+    word = "yes" if all(decided) else f"{sum(decided)} of {len(decided)}" if any(decided) else "no"
+    return word + (f", {len(outcomes) - len(decided)} open" if len(decided) < len(outcomes) else "")

@@ -98,14 +98,14 @@ def algorithms_4_and_5_agree(study: Study) -> Evidence:
 
 def fewer_iterations(study: Study) -> Evidence:
     """A case per load, or a single one if it holds on LOADS."""
-    known = []
+    compared = []
     for active, rows in loads(study).items():
         mine, *others = (iterations(rows.get(start)) for start in ("algorithm_5", *RIVALS))
         if mine is not None and None not in others:
             holds = all(mine <= other for other in others if other is not None)
-            known.append((f"{active} active", holds, f"{mine} against {' and '.join(map(str, others))}"))
-    met = sum(holds for _, holds, _ in known)
-    yield from known if met < LOADS else [("no more", True, f"on {met} of {len(known)} loads")]
+            compared.append((f"{active} active", holds, f"{mine} against {' and '.join(map(str, others))}"))
+    met = sum(holds for _, holds, _ in compared)
+    yield from compared if met < LOADS else [("no more", True, f"on {met} of {len(compared)} loads")]
 
 
 def start_saves_time(study: Study) -> Evidence:

@@ -47,15 +47,15 @@ def cg_iterations(study: Study) -> Section | None:
 
 
 def _by_iteration(lines: dict[str, Counts]) -> list[Row]:
-    def cell(found: Counts, k: int) -> str:
-        both = [str(kind[k]) for kind in (found.predictor, found.corrector) if k < len(kind)]
-        if found.cut and k == len(found.predictor) - 1:
+    def cell(counts: Counts, k: int) -> str:
+        both = [str(kind[k]) for kind in (counts.predictor, counts.corrector) if k < len(kind)]
+        if counts.cut and k == len(counts.predictor) - 1:
             both[-1] = f"≥ {both[-1]}"
         return " / ".join(both)
 
-    length = max(len(found.predictor) for found in lines.values())
+    length = max(len(counts.predictor) for counts in lines.values())
     return [
-        {"iteration": k + 1} | {name: cell(found, k) for name, found in lines.items()} for k in range(length)
+        {"iteration": k + 1} | {name: cell(each, k) for name, each in lines.items()} for k in range(length)
     ]
 
 
@@ -96,11 +96,11 @@ def iterations(row: Row | None) -> int | None:
 
 
 def starting_points(study: Study) -> Section | None:
-    found = loads(study)
-    if not any(rival in rows for rows in found.values() for rival in RIVALS):
+    measured = loads(study)
+    if not any(rival in rows for rows in measured.values() for rival in RIVALS):
         return None
     lines = []
-    for active, rows in found.items():
+    for active, rows in measured.items():
         line: Row = {"active, printed": active}
         line["ours"] = max((row["active"] for row in rows.values()), default=None)
         for start, name in STARTS.items():

@@ -107,15 +107,15 @@ def faster_at_half_contact(rival: str, *, once: bool = False) -> Callable[[Study
     """The interior-point method, where half of m is active, at each size; `once`: one size is enough."""
 
     def evidence(study: Study) -> Evidence:
-        found = []
+        compared = []
         for n in study.sizes:
             mine, other = _at_half(study, "IPM", n), _at_half(study, rival, n)
             if mine and other:
                 faster = bool(mine["at_least"] < other["at_least"])
                 known = not (mine if faster else other)["cut"]
-                found.append((f"n = {n}", faster if known else None, against(mine, other)))
-        met = [case for case in found if case[1]]
-        yield from met if once and met else found
+                compared.append((f"n = {n}", faster if known else None, against(mine, other)))
+        met = [case for case in compared if case[1]]
+        yield from met if once and met else compared
 
     return evidence
 

@@ -148,7 +148,7 @@ def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series
 
 def test_a_series_whose_damage_sqlite_cannot_spell_is_named(tmp_path: Path) -> None:
     """Its message quotes bytes that are no UTF-8."""
-    series_file.create(tmp_path)
+    series_file.write_fact(tmp_path, "other", "")
     with closing(sqlite3.connect(tmp_path / SERIES)) as connection, connection:
         connection.execute("PRAGMA writable_schema = ON")
         connection.execute("UPDATE sqlite_master SET name = CAST(X'FD90' AS TEXT) WHERE type = 'index'")

@@ -24,7 +24,7 @@ from problems.scene_files import read_scene
 
 COPIED = (
     *("problems/__init__.py", "harness/__init__.py", "harness/results/__init__.py"),
-    *("harness/results/provenance.py", "pyproject.toml"),
+    *("harness/results/provenance.py", "harness/results/schema.py", "pyproject.toml"),
 )
 ASK = "from harness.results.provenance import commit; import json; print(json.dumps(commit()))"
 NOT_KNOWN = (__version__, None)
