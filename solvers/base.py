@@ -76,7 +76,7 @@ def failed(cause: str, iterations: int | None = None) -> Answer:
 
 
 #: (load cases of one assembly, tolerance) → an answer to each, in their order.
-Batch = Callable[[Sequence[LoadCase], float], list[Answer]]
+Batch = Callable[[Sequence[Any], float], list[Answer]]
 
 
 @dataclass(frozen=True)
@@ -122,8 +122,9 @@ class Solver(ABC):
     -----
     The problem is min ½xᵀKx − fᵀx, Aᵀx ≤ g with K (n, n) in N/mm, A (n, m) and loads f (n,) in N,
     g (m,) in mm. Its dual is min ½λᵀQλ − pᵀλ, λ ≥ 0 with Q = AᵀK⁻¹A in mm/N and p = AᵀK⁻¹f − g in mm.
-    All arrays are read-only and shared. Lengths, forces and the tolerance are scaled before the solver sees
-    them (problems/forms/solver_units.py).
+    All arrays are read-only and shared. A solver sees lengths and forces multiplied by powers of two, by
+    which those of a joint in mm and N hardly change (problems/forms/solver_units.py). The tolerance is scaled
+    with them: a solver that stops at max|min(λ, y)| or at max|y| ≤ tolerance compares it with gaps in mm.
 
     Examples
     --------
@@ -182,14 +183,14 @@ class Solver(ABC):
         """
         return data
 
-    def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
+    def setup(self, state: Any, load: Any, tolerance: float) -> Any:
         """Set up the first load case of a series, or one that is solved by itself.
 
         Parameters
         ----------
         state : object
             The result of `prepare`.
-        load : LoadCase
+        load : LoadCase or DualLoadCase
             f (n,) in N, g (m,) in mm, and p (m,) in mm in the dual form.
         tolerance : float
             The largest violation of the optimality conditions, in the sense of the solver's own test.
@@ -201,7 +202,7 @@ class Solver(ABC):
         """
         return state
 
-    def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
+    def update(self, state: Any, ready: Any, load: Any, tolerance: float, start: WarmStart) -> Any:
         """Set up a further load case of the same assembly and tolerance; by default by `setup`.
 
         Parameters
@@ -240,7 +241,7 @@ class Solver(ABC):
         return None
 
     @abstractmethod
-    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+    def solve(self, ready: Any, load: Any, tolerance: float) -> Answer:
         """Solve a load case.
 
         Parameters
