@@ -41,17 +41,12 @@ def write_pdf(path: Path, record: dict[str, Any], arrays: dict[str, Array], pict
         f"{kind}, {contact}, at {position((x, y), arrays['nodes'])}: {significant(force)} N"
         for kind, contact, x, y, force in fasteners(record).itertuples(index=False)
     ]
-    room = page.lines_left - len(origin) - 4
-    if forces:
-        page.text("Forces in the fasteners", weight="bold")
-        for line in forces[:room]:
-            page.text(line)
-        if len(forces) > room:
-            page.text(f"and {len(forces) - room} more: answer.md")
-    page.text("How sure it is, and from what", weight="bold")
-    page.text(f"{record['grid']['said']}.")
-    for name, value in origin:
-        page.text(f"{name}: {value}")
+    room = int((page.at - LOWEST) / LINE) - len(origin) - 4
+    if len(forces) > room:
+        forces = [*forces[:room], f"and {len(forces) - room} more: answer.md"]
+    page.lines("Forces in the fasteners", forces)
+    sure = [f"{record['grid']['said']}.", *(f"{name}: {value}" for name, value in origin)]
+    page.lines("How sure it is, and from what", sure)
     page.figure.savefig(path, format="pdf", dpi=style.DPI)
 
 
@@ -61,14 +56,14 @@ class _Page:
     def __init__(self) -> None:
         self.figure, self.at = Figure(figsize=A4), TOP
 
-    @property
-    def lines_left(self) -> int:
-        return int((self.at - LOWEST) / LINE)
-
     def text(self, text: str, size: float = 8.0, letters: int = LETTERS, **look: Any) -> None:
         for line in wrap(plain(text), letters):
             self.figure.text(LEFT, self.at, line, va="top", size=size, parse_math=False, **look)
             self.at -= LINE * size / 8.0
+
+    def lines(self, heading: str, lines: list[str]) -> None:
+        for line in [heading, *lines] if lines else ():
+            self.text(line, weight="bold" if line is heading else "normal")
 
     def picture(self, file: Path) -> None:
         image = imread(file)

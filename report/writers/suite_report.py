@@ -45,12 +45,13 @@ def write(directory: Path) -> Path:
 
 
 def _measured(results: Results) -> str:
-    """'3 solvers on 1 scene; forms: dual and primal.'"""
+    """'3 solvers on 1 scene, in the dual and primal forms.'"""
     rows = results.rows[results.rows["status"] != "unsupported"]
     if rows.empty:
         return "Nothing was measured."
     counts = [counted(rows[name].nunique(), name) for name in ("solver", "scene")]
-    return f"{counts[0]} on {counts[1]}; forms: {listed(sorted(rows['form'].unique()))}."
+    forms = sorted(rows["form"].unique())
+    return f"{counts[0]} on {counts[1]}, in the {listed(forms)} form{'s' if forms[1:] else ''}."
 
 
 def contents(titles: Iterable[str]) -> str:
