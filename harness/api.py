@@ -16,7 +16,7 @@ InputError. Matrices are cached as by the command line. Arrays are copied, and t
 
 from __future__ import annotations
 
-from harness.commands import exchange, load_case_series, plain_arrays, run_comparison, suite_runs
+from harness.commands import load_case_series, plain_arrays, run_comparison, suite_runs
 from harness.commands.load_case_series import SeriesOptions, SeriesOutcome
 from harness.commands.suite_runs import SuiteOutcome
 from harness.conformance import check
@@ -25,7 +25,9 @@ from harness.placement import run as placement
 from harness.placement.run import Placement
 from harness.planning.overrides import Overrides
 from harness.results.comparison import Incomparable
+from harness.scene import export as files
 from harness.scene import solution
+from harness.scene import validate as checks
 from harness.scene.solution import Solution
 from harness.series.load_case_source import GapCases
 from harness.solving.call_lock import in_turn
@@ -83,9 +85,9 @@ __all__ = [
 
 check_solver = in_turn(check.run)
 compare = in_turn(run_comparison.compare)
-export = in_turn(exchange.export)
+export = in_turn(files.export)
 gate = in_turn(gates.gate)
-import_matrices = in_turn(exchange.import_matrices)
+import_matrices = in_turn(files.import_matrices)
 judge = in_turn(plain_arrays.judge)
 load_scene = in_turn(solution.load_scene)
 own_matrices = in_turn(plain_arrays.own_matrices)
@@ -97,4 +99,4 @@ run_series = in_turn(load_case_series.run_series)
 solve = in_turn(solution.solve)
 solve_dual = in_turn(plain_arrays.solve_dual)
 solve_series = in_turn(plain_arrays.solve_series)
-validate = in_turn(exchange.validate)
+validate = in_turn(checks.validate)

@@ -1,8 +1,12 @@
 """A command of the project in this process, its words as a user types them."""
 
+from io import StringIO
+
+from rich.console import Console
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
+from harness.terminal.console import ConsoleReporter
 
 
 def harness(*words: object) -> Result:
@@ -10,3 +14,8 @@ def harness(*words: object) -> Result:
     done = CliRunner().invoke(app, [*map(str, words)])
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done
+
+
+def onto(text: StringIO) -> ConsoleReporter:
+    """A reporter whose sentences come into a text."""
+    return ConsoleReporter(Console(file=text, width=200))

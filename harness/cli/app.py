@@ -8,9 +8,8 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Callable
-from enum import StrEnum
 from io import TextIOWrapper
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -28,13 +27,6 @@ from .suite import gate, report, run
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
-
-
-class Listed(StrEnum):
-    solvers = "solvers"
-    scenes = "scenes"
-    suites = "suites"
-    formats = "formats"
 
 
 def harness() -> None:
@@ -89,7 +81,7 @@ def check(
         raise typer.Exit(run_checks(names, plugin, time_limit, memory_limit, console))
 
 
-def list_(what: Listed) -> None:
+def list_(what: Literal["solvers", "scenes", "suites", "formats"]) -> None:
     """List the available solvers, scenes, suites or file formats.
 
     \b
@@ -100,26 +92,14 @@ def list_(what: Listed) -> None:
     with error_reporting() as console:
         from .listing import listing
 
-        console.print(listing(what.value))
-
-
-COMMANDS: dict[str, Callable[..., None]] = {
-    **{
-        "init": init,
-        "validate": validate,
-        "solve": solve,
-        "series": series,
-        "place": place,
-        "explore": explore,
-    },
-    **{"run": run, "report": report, "gate": gate, "compare": compare},
-    **{"check": check, "list": list_, "export": export, "import": import_, "judge": judge},
-}
+        console.print(listing(what))
 
 
 app.callback(help=docstring(harness))(harness)
-for name, command in COMMANDS.items():
-    app.command(name, help=docstring(command))(command)
+ONE_SCENE: list[Callable[..., None]] = [init, validate, solve, series, place, explore]
+OTHERS: list[Callable[..., None]] = [run, report, gate, compare, check, list_, export, import_, judge]
+for command in ONE_SCENE + OTHERS:
+    app.command(command.__name__.strip("_"), help=docstring(command))(command)
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -39,9 +39,17 @@ def export(
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.export import export as export_scene
+        from harness.terminal.console import ConsoleReporter
 
-        taken: Any = form.value if form else None
-        export_scene(scene, format, out, console, taken, with_reference, reference_limit)
+        export_scene(
+            scene,
+            out,
+            format=format,
+            form=form,
+            with_reference=with_reference,
+            reference_limit_s=reference_limit,
+            reporter=ConsoleReporter(console),
+        )
 
 
 def import_(
@@ -70,9 +78,10 @@ def import_(
     Exit codes: 0 read and written, 2 wrong usage or bad input.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
-        from harness.scene.export import import_ as import_files
+        from harness.scene.export import import_matrices
+        from harness.terminal.console import ConsoleReporter
 
-        import_files(files, out, console)
+        import_matrices(files, out, reporter=ConsoleReporter(console))
 
 
 def judge(
@@ -80,7 +89,7 @@ def judge(
     scene: SceneName,
     form: Annotated[
         FormName, option("FORM", "The form it was computed in: of sparse, x has all unknowns.")
-    ] = FormName.primal,
+    ] = "primal",
     limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
     reference_limit: ReferenceLimit = None,
 ) -> None:
@@ -102,5 +111,4 @@ def judge(
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.judge_file import judge_file
 
-        taken: Any = form.value
-        raise typer.Exit(judge_file(file, scene, taken, limit, console, reference_limit))
+        raise typer.Exit(judge_file(file, scene, form, limit, console, reference_limit))

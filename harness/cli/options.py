@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -36,12 +35,7 @@ def table_options(columns: str | None, missing: list[str] | None) -> TableOption
     return TableOptions(tuple(headings), tuple(missing or ()))
 
 
-class FormName(StrEnum):
-    primal = "primal"
-    dual = "dual"
-    sparse = "sparse"
-
-
+FormName = Literal["primal", "dual", "sparse"]
 SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or .npz with matrices.")
 ]

@@ -6,7 +6,7 @@ import os
 import shlex
 from pathlib import Path
 from string import Template
-from typing import Annotated, Any
+from typing import Annotated
 
 import tomlkit
 import typer
@@ -72,11 +72,9 @@ def solve(
         from harness.scene.solve import solve_into
         from harness.scene.two_scenes import solve_both
 
-        taken: Any = form.value if form else None
-
         def solved(source: str, folder: Path) -> int:
             return solve_into(
-                source, solver, tolerance, folder, console, reference_limit, taken, allow_gap, refine
+                source, solver, tolerance, folder, console, reference_limit, form, allow_gap, refine
             )
 
         if other is None:
@@ -96,8 +94,9 @@ def validate(scene: SceneName) -> None:
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.validate import validate as validate_scene
+        from harness.terminal.console import ConsoleReporter
 
-        validate_scene(scene, console)
+        validate_scene(scene, reporter=ConsoleReporter(console))
 
 
 def init(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -102,12 +102,11 @@ def series(
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         read_by = table_options(columns, missing)
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
-        taken: Any = form.value if form else None
         outcome = run_series(
             scene,
             out,
             GapCases(cases, seed, mean, sd, correlation_length, around, gaps, read_by),
-            SeriesOptions(solver, taken, *accuracy, threads, plugin, *limits),
+            SeriesOptions(solver, form, *accuracy, threads, plugin, *limits),
             sweep=sweep or (),
             allow_gap_mm=allow_gap,
             scheduler=scheduler,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from .options import NOTHING_WRITTEN, FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
+from .options import NOTHING_WRITTEN, Plugin, ReferenceLimit, Scheduler, error_reporting, option
 
 
 def run(
@@ -35,7 +35,7 @@ def run(
         ),
     ] = None,
     form: Annotated[
-        list[FormName] | None, option("FORM", "Only this form: primal, dual or sparse. Repeatable.")
+        list[str] | None, option("FORM", "Only this form: primal, dual or sparse. Repeatable.")
     ] = None,
     tolerance: Annotated[
         list[str] | None,
@@ -91,12 +91,13 @@ def run(
         from harness.planning.overrides import Overrides, tolerances_of
         from harness.terminal.console import ConsoleReporter
 
+        forms: Any = tuple(form or ())  # checked with the suite
         change = Overrides(
             sizes=tuple(size or ()),
             scenes=tuple(scene or ()),
             solvers=tuple(solver or ()),
             requirements=tuple(with_ or ()),
-            forms=tuple(choice.value for choice in form or ()),
+            forms=forms,
             tolerances=tolerances_of(tolerance or []),
             options=tuple(setting or ()),
             repeats=repeat,

@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
 from harness.results.atomic_output import atomic_output, refuse_unwritable
+from harness.terminal.console import console_of
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem, opened, reference_problem
 from problems import formats
@@ -37,6 +37,7 @@ from problems.forms.problem import in_form
 from problems.input import matrix_files
 from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import Scene
+from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from report.document.numbers import counted
 
@@ -46,17 +47,51 @@ Arrays = dict[str, Any]
 
 
 def export(
-    source: str,
-    format: str | None,
-    out: Path,
-    console: Console,
+    scene: str | Path,
+    out: str | Path,
+    *,
+    format: str | None = None,
     form: Form | None = None,
     with_reference: bool = False,
     reference_limit_s: float | None = None,
-) -> None:
-    """Write K, A, f, g of a scene in a format of problems.formats; with a form, its quadratic program, as
-    .npz if `out` ends in that, else as a folder of Matrix Market files. Raises InputError.
+    reporter: Reporter = SILENT,
+) -> Path:
+    """Write K, A, f, g of a scene in a file format, or its quadratic program in a form.
+
+    Parameters
+    ----------
+    scene : str or Path
+        Name of a scene, or the path of its file.
+    out : str or Path
+        A file, or a folder for a format of several files.
+    format : str, optional
+        Format of K, A, f, g: npz, mtx, op4, …; none if `form` is given.
+    form : str, optional
+        "primal", "dual" or "sparse": P, q, G, h (or lb) of min ½zᵀPz + qᵀz, Gz ≤ h, in N and mm.
+    with_reference : bool, optional
+        With a form: also x*, λ*, their error bound and the limit.
+    reference_limit_s : float, optional
+        Limit on the search for the reference, s.
+    reporter : Reporter, optional
+        With the console of a ConsoleReporter, what was written is shown; silent by default.
+
+    Returns
+    -------
+    Path
+        What was written.
+
+    Raises
+    ------
+    InputError
+        If the scene or a choice is wrong.
+
+    Examples
+    --------
+    >>> from rivetbench import export
+    >>> export("gallery/three-part-stack", "stack.npz", format="npz").exists()
+    True
     """
+    out = Path(out)
     if form is None and with_reference:
         raise InputError.one("--with-reference", "form", None, "needs --form: primal, dual or sparse")
     if form is None and format not in formats.FORMATS:
@@ -66,20 +101,21 @@ def export(
         allowed = "none with --form: PATH.npz is one file, any other PATH a folder of .mtx"
         raise InputError.one("--format", "format", format, allowed)
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
-    scene = read_scene(source)
-    refuse_unwritable(out, scene.sources)
+    read = read_scene(str(scene))
+    refuse_unwritable(out, read.sources)
     if format is not None:
-        problem = opened(scene)
+        problem = opened(read)
         data = matrices(problem.prepared, problem.load)
-        with atomic_output(out, scene.sources) as new:
+        with atomic_output(out, read.sources) as new:
             formats.FORMATS[format].write(new, data)
         content = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
     elif form is not None:
-        arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
-        with atomic_output(out, scene.sources) as new:
+        arrays, about = _program(str(scene), read, form, with_reference, reference_limit_s)
+        with atomic_output(out, read.sources) as new:
             (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
         content = f"{form} form, {len(arrays['q'])} unknowns, {counted(about['m'], 'contact')}"
-    console.print(f"{out}: {scene.name}, {content}.")
+    console_of(reporter).print(f"{out}: {read.name}, {content}.")
+    return out
 
 
 def _refuse_suffix(out: Path, kind: formats.Format, program: bool) -> None:
@@ -139,12 +175,37 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
     (path / "about.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")
 
 
-def import_(files: list[str], out: Path, console: Console) -> None:
-    """Read K, A, f, g from files, check them, and write them as one .npz, which is a scene.
+def import_matrices(files: Sequence[str], out: str | Path, *, reporter: Reporter = SILENT) -> Path:
+    """Read K, A, f, g from other programs' files, check them, and write them as one .npz, which is a scene.
 
-    files : PATH, NAME=PATH for a file of one matrix, NAME=PATH:MATRIX for one of several; in any order.
-    Raises InputError, with what is at `out` unchanged.
+    Parameters
+    ----------
+    files : sequence of str
+        PATH, NAME=PATH for a file of one matrix, NAME=PATH:MATRIX for one of several. K is in N/mm, f in N,
+        g in mm.
+    out : str or Path
+        The .npz to write.
+    reporter : Reporter, optional
+        With the console of a ConsoleReporter, sizes and digits are shown; silent by default.
+
+    Returns
+    -------
+    Path
+        The .npz, which `load_scene` reads.
+
+    Raises
+    ------
+    InputError
+        If a file is wrong, or K is not symmetric and positive definite.
+
+    Examples
+    --------
+    >>> from rivetbench import export, import_matrices
+    >>> op4 = export("gallery/three-part-stack", "stack.op4", format="op4")
+    >>> import_matrices([str(op4)], "mine.npz").name
+    'mine.npz'
     """
+    out, console = Path(out), console_of(reporter)
     if out.suffix != ".npz":
         raise InputError.one("--out", "path", str(out), "must end in .npz, which makes it a scene")
     sources = [*map(_source, files)]
@@ -161,6 +222,7 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
     sentence, few = digits_sentence(problem, solved=False)
     console.print(f"{sentence}.", style="yellow" if few else None)
+    return out
 
 
 def _source(text: str) -> tuple[str, Path, str]:

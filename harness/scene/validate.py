@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,8 +11,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from harness.planning.form_choice import chosen_form, size_of
+from harness.planning.form_choice import Size, chosen_form, size_of
 from harness.results.provenance import physical_memory_mib
+from harness.terminal.console import console_of
 from harness.terminal.docstrings import docstring
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
@@ -22,21 +24,53 @@ from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
+from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from report.document.numbers import counted
 
 
-def validate(source: str, console: Console) -> None:
-    """Read and check a scene, print what it is made of and the memory it needs. Raises InputError."""
-    scene = read_scene(source)
-    if not isinstance(scene, JointScene):
-        _matrices(scene, console)
-        return
-    if not isinstance(scene.joint, Joint):
-        _superelements(scene, console)
-        return
-    size, physical = size_of(scene), physical_memory_mib()
-    assert size is not None
+def validate(scene: str | Path, *, reporter: Reporter = SILENT) -> Size | None:
+    """Check a scene without solving it.
+
+    Parameters
+    ----------
+    scene : str or Path
+        Name of a scene, or the path of its file.
+    reporter : Reporter, optional
+        With the console of a ConsoleReporter, what would be built is shown; silent by default.
+
+    Returns
+    -------
+    Size or None
+        n unknowns, m contacts, and the memory of either form, MiB; None for small matrices.
+
+    Raises
+    ------
+    InputError
+        With all faults of the scene.
+
+    Examples
+    --------
+    >>> from rivetbench import validate
+    >>> size = validate("gallery/three-part-stack")
+    >>> size.n, size.m
+    (1107, 738)
+    """
+    read, console = read_scene(str(scene)), console_of(reporter)
+    size = size_of(read)
+    if isinstance(read, JointScene) and isinstance(read.joint, Joint):
+        assert size is not None
+        _plates(read, size, console)
+    elif isinstance(read, JointScene):
+        _superelements(read, console)
+    else:
+        _matrices(read, console)
+    return size
+
+
+def _plates(scene: JointScene, size: Size, console: Console) -> None:
+    """Print parts, contacts and effects, and the memory of either form."""
+    physical = physical_memory_mib()
     form = chosen_form(scene, FORMS, None).form
     console.print(f"{scene.name}: {scene.title}. Fine.")
     print_unusual(scene, console)

@@ -11,7 +11,7 @@ from commands import harness
 from matrix_files import PATHS, files_of
 from rich.console import Console
 
-from harness.scene.export import export, import_
+from harness.scene.export import export, import_matrices
 from harness.scene.solve import solve_into
 from problems import formats
 from problems.build import load_case, prepared
@@ -93,9 +93,9 @@ def test_validate_says_so_and_there_is_nothing_to_measure(path: Path) -> None:
 def test_there_and_back(form: str, path: Path) -> None:
     """And the matrices, solved by themselves, give the same displacements."""
     file, back = path.parent / PATHS[form], path.parent / "back.npz"
-    export(str(path), form, file, QUIET)
+    export(str(path), file, format=form)
     assert file.is_dir() == formats.FORMATS[form].is_folder
-    import_(files_of(form, file), back, QUIET)
+    import_matrices(files_of(form, file), back)
     own, scene = read_scene(str(back)), read_scene(str(path))
     wanted, found = prepared(scene), prepared(own)
     np.testing.assert_array_equal(found.assembly.K.matrices[0], wanted.assembly.K.matrices[0])
@@ -108,4 +108,4 @@ def test_there_and_back(form: str, path: Path) -> None:
 
 def test_dmig_has_no_way_to_say_so(path: Path) -> None:
     with pytest.raises(InputError, match="no matrix without columns"):
-        export(str(path), "dmig", path.parent / "k.pch", QUIET)
+        export(str(path), path.parent / "k.pch", format="dmig")

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from rich.console import Console
+from commands import onto
 
-from harness.scene.export import export, import_
+from harness.scene.export import export, import_matrices
 from problems import formats
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti
@@ -18,7 +18,6 @@ from problems.input.user_matrices import checked, holds_sparse, read_matrices
 
 K = np.array([[4.0, -1.0], [-1.0, 3.0]])
 LOWER, UPPER = [(1, 1, 4.0), (2, 1, -1.0), (2, 2, 3.0)], [(1, 1, 4.0), (1, 2, -1.0), (2, 2, 3.0)]
-QUIET = Console(file=StringIO())
 BOTH = [*LOWER, (1, 2, -1.0)]
 NAMES = {"mtx": "K.mtx", "dmig": "KAA.pch", "abaqus": "K.mtx", "npz": "K.npz", "op4": "KAA.op4"}
 
@@ -145,7 +144,7 @@ def test_one_matrix_of_several_is_chosen_by_name(form: str) -> None:
     np.testing.assert_array_equal(read(content, name, "KAA"), K)
     np.testing.assert_array_equal(read(content, name, "maa"), 2 * K)
     formats.FORMATS["mtx"].write(Path("."), {"A": np.eye(2, 1), "f": np.ones(2), "g": np.ones(1)})
-    import_([f"K={name}:MAA", "A.mtx", "f.mtx", "g.mtx"], Path("out.npz"), QUIET)
+    import_matrices([f"K={name}:MAA", "A.mtx", "f.mtx", "g.mtx"], Path("out.npz"))
     np.testing.assert_array_equal(np.load("out.npz")["K"], 2 * K)
     with pytest.raises(InputError, match=r"\['KAA', 'MAA'\].*matrix = \"NAME\" in a part, K=FILE:NAME"):
         read(content, name)
@@ -160,10 +159,10 @@ def test_signs_in_paths_are_no_names() -> None:
     formats.FORMATS["mtx"].write(Path("run=3"), data)
     others = [f"run=3/{name}.mtx" for name in "Afg"]
     for stiffness in ("K=run=3/K.mtx", "run=3/K.mtx", "K=run=3/K.mtx:K"):
-        import_([stiffness, *others], Path("out.npz"), QUIET)
+        import_matrices([stiffness, *others], Path("out.npz"))
     for drive in ("C:\\job.op4", "C:job.op4", "C:\\job.op4:KAA"):
         with pytest.raises(InputError, match="no such file") as error:
-            import_([f"K={drive}", *others], Path("out.npz"), QUIET)
+            import_matrices([f"K={drive}", *others], Path("out.npz"))
         assert error.value.faults[0].where == drive.removesuffix(":KAA")
 
 
@@ -174,17 +173,17 @@ def test_labelled_rows_are_said_and_digits_of_dmig_kept() -> None:
     formats.FORMATS["mtx"].write(Path("."), data)
     Path("K.mtx").write_text("9,1,9,1,4.0\n4,2,4,2,3.0\n")
     shown = StringIO()
-    import_([f"{name}.mtx" for name in "KAfg"], Path("out.npz"), Console(file=shown, width=200))
+    import_matrices([f"{name}.mtx" for name in "KAfg"], Path("out.npz"), reporter=onto(shown))
     assert "from node 4, dof 2 to node 9, dof 1: those of A and f must, too" in shown.getvalue()
     formats.FORMATS["dmig"].write(Path("rest.pch"), data | {"K": sp.csr_array(K), "f": np.zeros(2)})
-    import_(["rest.pch"], Path("out.npz"), Console(file=shown, width=200))
+    import_matrices(["rest.pch"], Path("out.npz"), reporter=onto(shown))
     assert "f is in none of the files: zero, as rest.pch leaves zeros out" in shown.getvalue()
 
 
 def test_files_of_a_folder_and_of_other_formats_are_not_named_alike() -> None:
     for form, out in (("mtx", "q.mps"), ("op4", "q.npz"), ("npz", "q")):
         with pytest.raises(InputError, match="no suffix" if form == "mtx" else "must end in"):
-            export("gallery/installed-fasteners", form, Path(out), QUIET)
+            export("gallery/installed-fasteners", Path(out), format=form)
 
 
 def test_arrays_beside_a_problem_are_refused_or_said() -> None:

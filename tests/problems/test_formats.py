@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from commands import harness
+from commands import harness, onto
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matrix_files import PATHS, files_of
 from rich.console import Console
 from small_problems import make_load, make_prepared, solve_by_nnls
 
-from harness.scene.export import export, import_, matrices
+from harness.scene.export import export, import_matrices, matrices
 from harness.scene.solve import solve_into
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import expected_error
@@ -31,14 +31,13 @@ from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
 
 ROOT = Path(__file__).parents[2]
-QUIET = Console(file=StringIO())
 SCENE = "gallery/installed-fasteners"  # springs join both parts into one block of K
 
 
 def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """K, A, f, g of the scene, and the same after export and import."""
-    export(SCENE, form, folder / PATHS[form], QUIET)
-    import_(files_of(form, folder / PATHS[form]), folder / "back.npz", QUIET)
+    export(SCENE, folder / PATHS[form], format=form)
+    import_matrices(files_of(form, folder / PATHS[form]), folder / "back.npz")
     scene = read_scene(SCENE)
     data = prepared(scene)
     wanted = matrices(data, load_case(scene))
@@ -103,8 +102,8 @@ def test_a_stiffness_that_nastran_calls_otherwise(tmp_path: Path) -> None:
     rest = {"A": sp.csc_array([[1.0], [0.0]]), "f": np.ones(2), "g": np.ones(1)}
     formats.FORMATS["mtx"].write(tmp_path, {"K": sp.csr_array(K)} | rest)
     with pytest.raises(InputError, match="say K=FILE"):
-        import_([str(stiffness), *others], tmp_path / "out.npz", QUIET)
-    import_([f"K={stiffness}", *others], tmp_path / "out.npz", QUIET)
+        import_matrices([str(stiffness), *others], tmp_path / "out.npz")
+    import_matrices([f"K={stiffness}", *others], tmp_path / "out.npz")
     np.testing.assert_array_equal(np.load(tmp_path / "out.npz")["K"], K)
 
 
@@ -166,8 +165,8 @@ def test_a_file_of_another_name(tmp_path: Path) -> None:
     renamed = tmp_path / "job_STIF2.mtx"
     (tmp_path / "K.mtx").rename(renamed)
     with pytest.raises(InputError, match="job_STIF2"):
-        import_([str(renamed), *files[1:]], tmp_path / "out.npz", QUIET)
-    import_([f"K={renamed}", *files[1:]], tmp_path / "out.npz", QUIET)
+        import_matrices([str(renamed), *files[1:]], tmp_path / "out.npz")
+    import_matrices([f"K={renamed}", *files[1:]], tmp_path / "out.npz")
     assert dict(np.load(tmp_path / "out.npz"))["K"].shape == (12, 12)
 
 
@@ -175,13 +174,13 @@ def test_a_name_picks_its_matrix_from_a_file_of_several(tmp_path: Path) -> None:
     one, two = matrices(*small(3)), matrices(*small(4))
     formats.FORMATS["npz"].write(tmp_path / "one.npz", one)
     formats.FORMATS["op4"].write(tmp_path / "two.op4", two)
-    import_([str(tmp_path / "one.npz"), f"f={tmp_path / 'two.op4'}"], tmp_path / "out.npz", QUIET)
+    import_matrices([str(tmp_path / "one.npz"), f"f={tmp_path / 'two.op4'}"], tmp_path / "out.npz")
     found = np.load(tmp_path / "out.npz")
     np.testing.assert_array_equal(found["f"], two["f"])
     np.testing.assert_array_equal(found["K"], one["K"].toarray())
     np.savez(tmp_path / "none.npz", stiffness=np.eye(2), mass=np.eye(2))
     with pytest.raises(InputError, match="a matrix K, or one matrix alone"):
-        import_([f"K={tmp_path / 'none.npz'}"], tmp_path / "out.npz", QUIET)
+        import_matrices([f"K={tmp_path / 'none.npz'}"], tmp_path / "out.npz")
 
 
 def test_what_is_missing_or_of_no_format_is_named(tmp_path: Path) -> None:
@@ -206,8 +205,8 @@ def test_nastran_without_pyyeti_says_what_to_install(tmp_path: Path, monkeypatch
     with pytest.raises(InputError, match="pip install"):
         formats.read(tmp_path / "k.op4")
     with pytest.raises(InputError, match="pip install"):
-        export(SCENE, "op4", tmp_path / "out.op4", QUIET)
-    export(SCENE, "dmig", tmp_path / "k.pch", QUIET)
+        export(SCENE, tmp_path / "out.op4", format="op4")
+    export(SCENE, tmp_path / "k.pch", format="dmig")
 
 
 # --- digits -------------------------------------------------------------------------------------------
@@ -262,14 +261,14 @@ def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     data["K"] = sp.csr_array(rounded(K, 7))
     formats.FORMATS["npz"].write(tmp_path / "seven.npz", data)
     shown, solved = StringIO(), StringIO()
-    import_([str(tmp_path / "seven.npz")], tmp_path / "out.npz", Console(file=shown, width=200))
+    import_matrices([str(tmp_path / "seven.npz")], tmp_path / "out.npz", reporter=onto(shown))
     solve_into(str(tmp_path / "seven.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
     for said in (shown.getvalue(), solved.getvalue(), (tmp_path / "answer" / "answer.md").read_text()):
         assert "seem to have 7 digits" in said
         assert "more than 1e-07 mm: export it with more digits" in said
     formats.FORMATS["npz"].write(tmp_path / "all.npz", data | {"K": sp.csr_array(K)})
     shown = StringIO()
-    import_([str(tmp_path / "all.npz")], tmp_path / "out2.npz", Console(file=shown, width=200))
+    import_matrices([str(tmp_path / "all.npz")], tmp_path / "out2.npz", reporter=onto(shown))
     assert "all digits of double precision" in shown.getvalue()
 
 
@@ -286,7 +285,7 @@ def test_digits_of_many_separate_unknowns_take_no_reference_and_no_dense_matrix(
     solved, shown = StringIO(), StringIO()
     solve_into(str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
     monkeypatch.setattr(ReferenceProblem, "reference", None)
-    import_([str(tmp_path / "mine.npz")], tmp_path / "out.npz", Console(file=shown, width=200))
+    import_matrices([str(tmp_path / "mine.npz")], tmp_path / "out.npz", reporter=onto(shown))
     for said in (solved.getvalue(), shown.getvalue()):
         (error,) = re.findall("seem to have 3 digits.* off by about (.*) mm, more", said)
         assert 1e-3 < float(error) < 1e-2

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg as sla
+from commands import onto
 from edge_draws import OUTCOMES, Draw, abaqus, dmig, encoded, matrix_market, npz, op4, table
-from rich.console import Console
 from sample_size import Fault, Log, draws
 from scipy.interpolate import RegularGridInterpolator
 from small_problems import by_nnls
 
 from harness.api import load_scene, own_matrices, random_gaps, solve
-from harness.scene.export import import_
+from harness.scene.export import import_matrices
 from harness.scene.judge_file import read_answer
 from problems.build import load_case, prepared
 from problems.errors import InputError
@@ -90,7 +90,7 @@ def own(draw: Draw, folder: Path) -> Task:
 
     def read() -> tuple[Array, list[str]]:
         said = io.StringIO()
-        import_(files, folder / "out.npz", Console(file=said, width=200))
+        import_matrices(files, folder / "out.npz", reporter=onto(said))
         return solve(load_scene(folder / "out.npz")).gap, said.getvalue().splitlines()
 
     return gaps_of(**data), read

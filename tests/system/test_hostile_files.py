@@ -1,6 +1,5 @@
 """Files that are damaged, foreign, missing or in the way: refused by name or mended, and nothing is lost."""
 
-from io import StringIO
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -9,15 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import harness
-from rich.console import Console
 from small_problems import make_load, make_prepared
 
-from harness.scene.export import import_, matrices
+from harness.scene.export import import_matrices, matrices
 from problems import formats
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti
-
-QUIET = Console(file=StringIO())
 
 
 def own_matrices(**changes: Any) -> formats.Data:
@@ -110,7 +106,7 @@ def test_an_absent_matrix_replaces_no_given_one_in_any_order(tmp_path: Path) -> 
     formats.FORMATS["mtx"].write(tmp_path, data)
     files = [cards(tmp_path / "konly.pch", K=stiffness(data["K"])), *(tmp_path / f"{x}.mtx" for x in "Afg")]
     for order in list(permutations(map(str, files)))[::5]:
-        import_(list(order), tmp_path / "out.npz", QUIET)
+        import_matrices(list(order), tmp_path / "out.npz")
         with np.load(tmp_path / "out.npz") as found:
             np.testing.assert_array_equal(found["f"], data["f"])
             np.testing.assert_array_equal(found["g"], data["g"])
@@ -122,7 +118,7 @@ def test_a_matrix_in_two_files_is_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "all.npz", **data)
     for files in permutations([str(tmp_path / "all.npz"), str(tmp_path / "m" / "f.mtx")]):
         with pytest.raises(InputError, match="too; say f=FILE"):
-            import_(list(files), tmp_path / "out.npz", QUIET)
+            import_matrices(list(files), tmp_path / "out.npz")
 
 
 @pytest.mark.parametrize(
@@ -138,7 +134,7 @@ def test_a_row_at_a_point_that_is_not_there_is_named(changed: Any, said: str, tm
     whole = {"K": stiffness(data["K"]), "A": frame(data["A"]), "F": frame(data["f"][:, None])}
     path = cards(tmp_path / "p.pch", **(whole | changed))
     with pytest.raises(InputError) as error:
-        import_([str(path)], tmp_path / "out.npz", QUIET)
+        import_matrices([str(path)], tmp_path / "out.npz")
     assert said in str(error.value)
 
 
