@@ -142,7 +142,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint = _joint(joint_path, joint_data, effects, faults)
     if joint is not None:
         for table in tables:
-            faults += table.misfits(joint, tables)
+            faults += table.faults(joint, tables)
         if len(effects) == len(tables) and isinstance(joint, Joint):
             faults += _floating(joint_path, joint, effects)
     if faults or joint is None:

@@ -6,11 +6,11 @@ from typing import Annotated
 
 import scipy.sparse as sp
 
-from problems.input.bounded_types import Finite, Positive
+from problems.input.bounded_types import Positive, Range
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.interface import AnyJoint, on_part
 from problems.model.joint import Faults
-from problems.model.plate import Plate, Range
+from problems.model.plate import Plate
 
 
 class LocalThickness(StiffnessEffect):
@@ -20,17 +20,16 @@ class LocalThickness(StiffnessEffect):
     """
 
     thickness: Annotated[Positive, "mm"]
-    x: Annotated[tuple[Finite, Finite], "mm"]
-    y: Annotated[tuple[Finite, Finite], "mm"]
+    x: Annotated[Range, "mm"]
+    y: Annotated[Range, "mm"]
 
     @property
     def pad(self) -> tuple[float, Range, Range]:
         return self.thickness, self.x, self.y
 
     def misfits(self, plate: Plate) -> Faults:
-        (x, x_end), (y, y_end) = self.x, self.y
-        if not (x < x_end and y < y_end and plate.covers(x, y) and plate.covers(x_end, y_end)):
-            yield "x, y", [list(self.x), list(self.y)], f"start < stop, {on_part(plate)}"
+        if not all(map(plate.covers, self.x, self.y)):
+            yield "x, y", [list(self.x), list(self.y)], on_part(plate)
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)

@@ -25,5 +25,4 @@ class Ribs(StiffnessEffect):
                 yield f"lines[{k}]", y, on_part(plate)
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
-        EI, GJ = plate.young * self.I, plate.shear_modulus * self.J
-        return plate.beams(self.lines, EI, GJ, along_x=True)
+        return plate.beams(self.lines, self.I, self.J, along_x=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded_types import Finite, Positive
+from problems.input.bounded_types import Positive, Range
 from problems.model.effect import ContactEffect, Effect, GapEffect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults, Pair
@@ -20,8 +20,8 @@ class Shims(ContactEffect, GapEffect):
     """
 
     thickness: Annotated[Positive, "mm"]
-    x: Annotated[tuple[Finite, Finite], "mm"]
-    y: Annotated[tuple[Finite, Finite], "mm"]
+    x: Annotated[Range, "mm"]
+    y: Annotated[Range, "mm"]
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
@@ -29,8 +29,7 @@ class Shims(ContactEffect, GapEffect):
         places = np.concatenate([np.zeros((0, 2)), *map(joint.places, pairs)])
         if len(places) and not self._covered(places).any():
             x, y = places[((places - np.mean([self.x, self.y], axis=1)) ** 2).sum(axis=1).argmin()]
-            allowed = f"ranges that contain a node; the nearest is at {x:g}, {y:g} mm"
-            yield "x, y", [list(self.x), list(self.y)], allowed
+            yield "x, y", [list(self.x), list(self.y)], f"ranges with a node; the nearest: at {x:g}, {y:g} mm"
 
     def _covered(self, nodes: Matrix) -> Mask:
         at_x, at_y = nodes.T

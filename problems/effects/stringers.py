@@ -34,7 +34,6 @@ class Stringers(StiffnessEffect):
             yield "pitch", self.pitch, f"at least {plate.x[-1] / MOST:g} mm: {MOST} stringers"
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
-        EI, GJ = plate.young * self.I, plate.shear_modulus * self.J
         positions = np.arange(0.0, plate.x[-1] + 1e-9 * self.pitch, self.pitch)
         lines = np.minimum(positions, plate.x[-1]).tolist()
-        return plate.beams(lines, EI, GJ, along_x=False, ends=(self.start, self.stop))
+        return plate.beams(lines, self.I, self.J, along_x=False, ends=(self.start, self.stop))

@@ -38,14 +38,12 @@ class SupportShift(PartLoadEffect):
                 allowed = f"a point of a supports effect of part {self.part}, one of {supported}"
                 yield f"points[{k}]", list(point), allowed
             if point in shifted:
-                allowed = "one support_shift per support: another one shifts this support"
-                yield f"points[{k}]", list(point), allowed
+                yield f"points[{k}]", list(point), "one support_shift per support: another shifts this one"
 
     def load(self, model: PartModel) -> Vector:
         f = np.zeros(model.plate.size)
         for effect in model.effects:
             if isinstance(effect, Supports):
                 for point in (point for point in effect.points if point in self.points):
-                    e = model.plate.evaluate(*point)
-                    f += effect.stiffness_per_point * self.shift * e.toarray()[0]
+                    f += effect.stiffness_per_point * self.shift * model.plate.evaluate(*point).toarray()[0]
         return f

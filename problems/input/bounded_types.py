@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, Field, StringConstraints, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints, ValidationError
 
 from problems.errors import Fault, InputError
 
@@ -21,6 +21,16 @@ MIB = 2**20
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+
+
+def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
+    if not ends[0] < ends[1]:
+        raise ValueError("must be start < stop")
+    return ends
+
+
+#: A length along an axis, from start to stop.
+Range = Annotated[tuple[Finite, Finite], AfterValidator(_ascending)]
 #: Seeds that every reader of JSON keeps exactly.
 Seed = Annotated[int, Field(ge=0, lt=2**53)]
 #: A name that a picture, a table and a file can show: one line without control characters.

@@ -16,10 +16,11 @@ import scipy.sparse as sp
 from pydantic import Field, PrivateAttr
 
 from problems.forms.assembly import Matrix, Vector
+from problems.input.bounded_types import Range
 
 from .interface import AnyJoint
 from .joint import Faults, Pair, Table
-from .plate import Plate, Range
+from .plate import Plate
 
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
@@ -69,7 +70,7 @@ class Effect(Table):
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         """Yield the parameters that do not fit the joint, or contradict other effects of the scene.
 
-        The scene is then refused with all of them in one message; nothing is raised here.
+        Called once a scene's tables are read: it is refused with all faults in one message.
 
         Parameters
         ----------

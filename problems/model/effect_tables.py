@@ -93,15 +93,13 @@ class EffectTable:
             allowed = "of a measured_gap, a list of what marks a point without a gap, as [9999, 'NaN']"
             yield "missing", missing, allowed
 
-    def misfits(self, joint: AnyJoint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
+    def faults(self, joint: AnyJoint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
         """Yield the faults with respect to the joint and to the effects of the other tables."""
-        faults: Faults = iter(())
         if self.effect is not None:
             others = [table.effect for table in tables if table.effect is not None and table is not self]
-            faults = self.effect.faults(joint, others)
+            yield from self._located(self.effect.faults(joint, others))
         elif isinstance(part := self.content.get("part"), str):
-            faults = unknown_part(part, joint)
-        yield from self._located(faults)
+            yield from self._located(unknown_part(part, joint))
 
     @property
     def _name(self) -> str:

@@ -43,7 +43,8 @@ def pressing_forces(
     Parameters
     ----------
     acting : function
-        Gives for a pair points (k, 2), mm, and the force at each of them, N.
+        Gives for a pair some (points, force): at each of the points (k, 2), mm, acts this force, N, so that
+        their sum is k · force. A negative force presses the parts apart.
     pairs : sequence
         The pairs (a, b) that are pressed.
     joint : AnyJoint

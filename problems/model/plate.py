@@ -16,8 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
+from problems.input.bounded_types import Range
 
-Range = tuple[float, float]
 WHOLE: Range = -np.inf, np.inf
 LineLoads = tuple[Vector, Vector]
 
@@ -55,11 +55,6 @@ class Plate:
         """D = E t³ / (12 (1 − ν²)), N·mm."""
         return self.young * self.thickness**3 / (12 * (1 - self.poisson**2))
 
-    @property
-    def shear_modulus(self) -> float:
-        """G = E / 2(1 + ν), N/mm²."""
-        return self.young / (2 * (1 + self.poisson))
-
     def stiffness(self, x: Range = WHOLE, y: Range = WHOLE) -> sp.csr_array:
         """The bending stiffness (size, size), N/mm and N, of the free plate within the ranges.
 
@@ -94,15 +89,16 @@ class Plate:
         return sp.kron(evaluate(self.y, y, dy), evaluate(self.x, x, dx)).tocsr()
 
     def beams(
-        self, lines: Sequence[float], EI: float, GJ: float, along_x: bool, ends: Range = WHOLE
+        self, lines: Sequence[float], inertia: float, torsion: float, along_x: bool, ends: Range = WHOLE
     ) -> sp.csr_array:
         """The stiffness of beams along x, or y, on each of the lines, between two ends.
 
-        Σ EI ∫ w_ss² ds + GJ ∫ w_xy² ds with s along the beam; EI and GJ in N·mm².
+        Σ EI ∫ w_ss² ds + GJ ∫ w_xy² ds with s along the beam; inertia I and torsion J in mm⁴.
         """
         own, other = (self.x, self.y) if along_x else (self.y, self.x)
         line = line_matrices(own, *ends)
         e, slope = (sp.vstack([evaluate(other, each, d) for each in lines]) for d in (0, 1))
+        EI, GJ = self.young * inertia, self.young / (2 * (1 + self.poisson)) * torsion
         terms = (EI, (e.T @ e, line.H)), (GJ, (slope.T @ slope, line.G))
         return sum(factor * sp.kron(*(pair if along_x else pair[::-1])) for factor, pair in terms).tocsr()
 

@@ -43,7 +43,7 @@ SUPPORTS = 'kind = "supports"\npart = "a"\npoints = [[0.0, 0.0]]'
 ALONE = [
     ('kind = "shims"\nthickness = -0.1\nx = [0, 9]\ny = [0, 9]', "thickness", "greater than 0; in mm"),
     ('kind = "shims"\nthickness = 0.1\nx = [3, 9]\ny = [0, 9]', "x, y", "at 0, 0 mm"),
-    ('kind = "shims"\nthickness = 0.1\nx = [9, 3]\ny = [0, 9]', "x, y", "at 0, 0 mm"),
+    ('kind = "shims"\nthickness = 0.1\nx = [9, 3]\ny = [0, 9]', "x", "start < stop; in mm"),
     ('kind = "self_weight"\npart = "a"\ndensity = 0', "density", "greater than 0; in kg/m³"),
     ('kind = "self_weight"\npart = "c"', "part", "['a', 'b']"),
     ('kind = "thermal_bending"\npart = "a"\ndifference = nan', "difference", "finite number; in K"),
@@ -61,7 +61,7 @@ ALONE = [
         "x, y",
         "× 0 … 90 mm",
     ),
-    ('kind = "local_thickness"\npart = "a"\nthickness = 1\nx = [9, 9]\ny = [1, 9]', "x, y", "start < stop"),
+    ('kind = "local_thickness"\npart = "a"\nthickness = 1\nx = [9, 9]\ny = [1, 9]', "x", "start < stop"),
     ('kind = "rigid_tool"\npart = "a"\ncurvature = [0.1]', "curvature.1", "required; in 1/mm"),
     (
         'kind = "support_shift"\npart = "a"\npoints = [[0, 0]]\nshift = 1',

@@ -47,30 +47,35 @@ def test_the_scene_of_the_page_is_solved_and_drawn_whole(
             assert (border == 1.0).all()
 
 
-def test_the_new_effect_of_the_page_is_one_short_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Put into a folder of effects, it is known to scenes, messages and loads by its name alone."""
-    code = re.search(r"```python\n# problems/effects/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL)
-    assert len(code[2].splitlines()) <= 40
-    (tmp_path / f"{code[1]}.py").write_text(code[2])
+def test_the_new_effects_of_the_page_are_short_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put into a folder of effects, they are known to scenes, messages and loads by their names alone."""
+    files = re.findall(r"```python\n# problems/effects/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL)
+    assert [name for name, _ in files] == ["line_load", "sealant_pressure"]
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    monkeypatch.delitem(sys.modules, f"problems.effects.{code[1]}", raising=False)
-    table = (
-        f'[[effect]]\nkind = "{code[1]}"\npart = "skin"\nvalue = 0.5\nx = 45.0\nstart = -60\nstop = 40.0\n'
-    )
-    (tmp_path / "scene.toml").write_text(JOINT[1] + table)
+    for name, code in files:
+        assert len(code.splitlines()) <= 42
+        (tmp_path / f"{name}.py").write_text(code)
+        monkeypatch.setitem(sys.modules, f"problems.effects.{name}", None)
+        del sys.modules[f"problems.effects.{name}"]
+    line = '[[effect]]\nkind = "line_load"\npart = "skin"\nvalue = 0.5\nx = 45.0\nstart = -60\nstop = 40.0\n'
+    area = '[[effect]]\nkind = "sealant_pressure"\npressure = 0.5\nx = [45.0, 67.0]\ny = [20.0, 40.0]\n'
+    (tmp_path / "scene.toml").write_text(JOINT[1] + line + area)
     scene = read_scene(str(tmp_path / "scene.toml"))
-    force = load_case(scene, "sparse").f - load_case(scene, "sparse", scene.effects[:-1]).f
+    *_, load, apart = scene.effects
     skin = JointModel.of(scene).parts[1].plate
     rigid = np.kron(np.tile([1.0, 0.0], len(skin.y)), np.tile([1.0, 0.0], len(skin.x)))
-    assert scene.effects[-1].load(JointModel.of(scene).parts[1]) @ rigid == pytest.approx(50.0, rel=1e-12)
-    assert np.count_nonzero(force) > 0
-    assert scene.marks()[-2:].tolist() == [[45.0, 0.0], [45.0, 40.0]]
-    (tmp_path / "bad.toml").write_text(JOINT[1] + table.replace("40.0", "121.0"))
-    with pytest.raises(InputError, match=re.escape(f"({code[1]}).x, stop = [45.0, 121.0]: on the part")):
+    assert load.load(JointModel.of(scene).parts[1]) @ rigid == pytest.approx(50.0, rel=1e-12)
+    assert (load_case(scene, "sparse").f != load_case(scene, "sparse", [*scene.effects[:-2], apart]).f).any()
+    assert scene.marks()[-6:].tolist()[:4] == [[45.0, 0.0], [45.0, 40.0], [45.0, 20.0], [45.0, 40.0]]
+    on_doubler, on_skin = np.split(apart.force(scene.joint), 2)
+    moments = on_skin @ np.column_stack([np.ones(len(on_skin)), scene.joint.nodes])
+    np.testing.assert_allclose(moments, [220.0, 220.0 * 56.0, 220.0 * 30.0], rtol=1e-12)
+    np.testing.assert_array_equal(on_doubler, -on_skin)
+    (tmp_path / "bad.toml").write_text(JOINT[1] + (line + area).replace("40.0", "121.0"))
+    with pytest.raises(InputError) as error:
         read_scene(str(tmp_path / "bad.toml"))
-    sys.modules.pop(f"problems.effects.{code[1]}")
+    assert "(line_load).x, stop = [45.0, 121.0]: on the part" in str(error.value)
+    assert "(sealant_pressure).x, y = [[45.0, 67.0], [20.0, 121.0]]: on the junction" in str(error.value)
 
 
 @pytest.mark.parametrize("kind", effect_kinds())

@@ -1,5 +1,6 @@
 """The recipes of CONTRIBUTING.md, done in a copy of the project as they are written."""
 
+import os
 import re
 import shlex
 import shutil
@@ -47,7 +48,8 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def passes(project: Path, words: list[str]) -> None:
-    done = subprocess.run([sys.executable, *words], cwd=project, capture_output=True, text=True)
+    env = os.environ | {"PYTEST_ADDOPTS": "-p no:cacheprovider"}
+    done = subprocess.run([sys.executable, *words], cwd=project, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -62,4 +64,4 @@ def test_the_checks_pass_with_the_recipes(project: Path, check: str) -> None:
 def test_a_recipe_is_complete(project: Path, recipe: str) -> None:
     (commands,) = re.findall(r"```sh\n(.*?)```", RECIPES[recipe], re.DOTALL)
     for command in commands.splitlines():
-        passes(project, [*shlex.split(command.removeprefix("python ")), "-p", "no:cacheprovider"])
+        passes(project, shlex.split(command.removeprefix("python ")))
