@@ -81,15 +81,6 @@ def test_one_changed_bit_is_named(root: Path, name: str) -> None:
             assert found is None or (name == storage.MANIFEST and found[1]["bound_mm"] == 1e-17)
 
 
-def test_of_long_files_the_size_alone_is_checked(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(storage, "CHECKED", 1000)
-    storage.store("key", ARRAYS, {})
-    path = root / "key" / "one.npy"
-    path.chmod(0o644)
-    path.write_bytes(path.read_bytes()[:-1] + b"x")
-    assert storage.load("key") is not None
-
-
 @pytest.mark.parametrize("content", [b"", b"[]", b"[" * 100_000, b"\xff", None, b'{"files": [], "hash": ""}'])
 def test_a_damaged_manifest_is_named_with_what_to_do(root: Path, content: bytes | None) -> None:
     storage.store("key", ARRAYS, {})
@@ -151,15 +142,6 @@ def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> N
         assert not array.flags.writeable
 
 
-def test_the_seconds_of_what_is_stored_are_known_unopened() -> None:
-    def seconds() -> Any:
-        return build.prepared(SCENE).facts["seconds"]
-
-    assert "Q" not in seconds()
-    _ = build.prepared(SCENE).Q
-    assert seconds()["Q"] > 0
-
-
 def with_more(text: str, edited: Path) -> Callable[[Path], bytes]:
     """Path.read_bytes, as if that text stood at the end of one file."""
     read = Path.read_bytes
@@ -171,17 +153,7 @@ OWN = "input.user_matrices"  # makes a user's matrices, no joint's
 
 @pytest.mark.parametrize(
     "module",
-    [
-        *("model.plate", "model.condensation"),
-        *(
-            "model.joint",
-            "model.part",
-            "stiffness.dense_block",
-            "forms.preparation_stages",
-            "effects.supports",
-            OWN,
-        ),
-    ],
+    ["model.condensation", "stiffness.dense_block", "forms.preparation_stages", "effects.supports", OWN],
 )
 def test_a_change_of_the_code_that_builds_changes_the_key(
     module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

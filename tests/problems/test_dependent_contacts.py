@@ -50,19 +50,20 @@ def column_of(A: sp.csc_array) -> int | None:
     return None
 
 
-@pytest.mark.parametrize("A", [differences(10_000), pairs(100_000), grid(70), sp.csc_array((3, 0))])
+@pytest.mark.parametrize("A", [differences(10_000), pairs(30_000), grid(70), sp.csc_array((3, 0))])
 def test_independent_contacts_are_taken(A: sp.csc_array) -> None:
     assert column_of(A) is None
 
 
-@pytest.mark.parametrize("A", [differences(10_000), pairs(100_000), grid(70)])
-@pytest.mark.parametrize("factor", [1.0, -3.0, 1e-40])
+@pytest.mark.parametrize(
+    ("A", "factor"), [(differences(10_000), 1.0), (pairs(30_000), -3.0), (grid(70), 1e-40)]
+)
 def test_a_contact_that_is_there_twice_is_named(A: sp.csc_array, factor: float) -> None:
     twice = sp.csc_array(sp.hstack([A, factor * A[:, [17]]]))
     assert column_of(twice) == A.shape[1]
 
 
-@pytest.mark.parametrize("m", [3, 300, 3000])
+@pytest.mark.parametrize("m", [3, 300])
 def test_a_cycle_is_dependent(m: int) -> None:
     assert column_of(cycle(m)) == m - 1
 
@@ -75,7 +76,7 @@ def test_nearly_dependent_contacts_are_taken_where_their_difference_is_no_roundi
 
 def test_small_integers_are_refused_exactly_where_their_rank_says_so() -> None:
     random, refused = np.random.default_rng(1), 0
-    for _ in range(500):
+    for _ in range(200):
         n, m = random.integers(2, 9), random.integers(1, 9)
         A = random.integers(-2, 3, (n, m)) * (random.random((n, m)) < 0.5)
         A[0, ~A.any(axis=0)] = 1
@@ -85,17 +86,16 @@ def test_small_integers_are_refused_exactly_where_their_rank_says_so() -> None:
         if column is not None:
             assert rank(A[:, : column + 1]) == rank(A[:, :column]) == column
             refused += 1
-    assert 100 < refused < 400
+    assert 40 < refused < 160
 
 
 @pytest.mark.parametrize(
     "words",
     [
-        *(f"solve OWN --form {form} --out NEW" for form in ("primal", "dual", "sparse")),
+        *(f"solve OWN --form {form} --out NEW" for form in ("dual", "sparse")),
         "validate OWN",
         "judge X OWN --form sparse",
         "export OWN --format npz --out NEW.npz",
-        "export OWN --form sparse --out NEW",
         "series OWN --solver newton --form sparse --gaps GAPS --out NEW",
         "run --scene OWN --solver newton --form sparse --out NEW",
         "import OWN --out NEW.npz",

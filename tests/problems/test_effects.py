@@ -1,7 +1,5 @@
 """Each effect's one term: gaps, forces at the junction, files of positions."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,7 +14,6 @@ from problems.effects.measured_gap import MeasuredGap
 from problems.effects.pressure import Pressure
 from problems.effects.rigid_tool import RigidTool
 from problems.effects.shims import Shims
-from problems.model.effect_tables import EffectTable
 
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
@@ -50,12 +47,6 @@ def test_a_fastener_at_a_node_acts_on_it_alone() -> None:
     for k, point in enumerate(JOINT.nodes.tolist()):
         f = Fasteners(kind="fasteners", preload=7.0, points=(tuple(point),)).force(JOINT)
         assert f[:45].tolist() == [7.0 * (node == k) for node in range(45)]
-
-
-def test_fastener_on_a_tool_has_no_counterpart() -> None:
-    joint = make_joint(PART, contacts=[["a", "tool"]], nodes=(9, 5))
-    f = Fasteners(kind="fasteners", preload=10.0, points=((0.0, 0.0),)).force(joint)
-    assert f.tolist() == [10.0] + 44 * [0.0]
 
 
 def patterned(**pattern: float) -> Fasteners:
@@ -219,12 +210,3 @@ def test_a_fastener_through_a_stack_presses_its_outer_parts_alone() -> None:
     assert f[:, 22].tolist() == [40.0, 0.0, -40.0]
     short = through.model_copy(update={"between": ("a", "b")}).force(THREE).reshape(3, 45)
     assert short[:, 22].tolist() == [40.0, -40.0, 0.0]
-
-
-def test_positions_from_a_file_are_those_of_the_list(tmp_path: Path) -> None:
-    (tmp_path / "rivets.csv").write_text("hole,x,y\n1,100,30\n\n2, 250.5 ,90\n")
-    data = {"kind": "fasteners", "preload": 7.0}
-    listed = Fasteners.model_validate(data | {"points": [[100, 30], [250.5, 90]]})
-    table = EffectTable(tmp_path / "scene.toml", 0, data | {"file": "rivets.csv"})
-    assert list(table.read()) == []
-    assert table.effect.model_dump() == listed.model_dump()

@@ -203,11 +203,6 @@ def test_a_bad_sweep(text: str, words: str, scene: Scene, data: Prepared) -> Non
         sweep(scene, [text])
 
 
-def test_springs_between_parts_are_no_sweep() -> None:
-    with pytest.raises(InputError, match=r"installed_fasteners\.stiffness.*what changes K"):
-        sweep(read_scene("gallery/installed-fasteners"), ["installed_fasteners.stiffness=1e4,1e5"])
-
-
 def test_a_key_swept_twice_and_two_effects_of_a_kind(data: Prepared, tmp_path: Path) -> None:
     more = '[[effect]]\nkind = "pressure"\npart = "a"\nvalue = 2e-4\n[[effect]]\nkind = "ribs"'
     scene = read_scene(str(write_strip(tmp_path, ('[[effect]]\nkind = "ribs"', more))))

@@ -80,14 +80,6 @@ def test_a_named_npz_in_a_scene(tmp_path: Path) -> None:
     assert read_scene(str(path)).title == "my own"
 
 
-def test_interleaved_blocks_become_one(tmp_path: Path) -> None:
-    order = np.array([0, 4, 1, 5, 2, 6, 3, 7])
-    K = DATA["K"][np.ix_(order, order)]
-    made, load = opened(write_npz(tmp_path, K=K, A=DATA["A"][order], f=DATA["f"][order]))
-    assert [block.shape for block in made.assembly.K.matrices] == [(8, 8)]
-    np.testing.assert_allclose(made.assembly.K.solve(load.f), np.linalg.solve(K, load.f), rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("bodies", "blocks"),
     [

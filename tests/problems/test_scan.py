@@ -7,7 +7,6 @@ import pytest
 from small_joints import make_joint, make_scene
 from superelements import flat, scene_from, stiffnesses, write_part
 
-from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
 from problems.load_cases.gaps_through_scan import NOISE
@@ -85,19 +84,3 @@ def test_a_scan_off_the_junction_or_beside_a_measured_gap(tmp_path: Path) -> Non
         random_gaps(
             make_scene(JOINT, measured), 1, 0, sd=1, correlation_length=9, around=tmp_path / "scan.csv"
         )
-
-
-def test_far_from_the_scan_the_field_is_the_scenes_own(tmp_path: Path) -> None:
-    """A field that is short beside the junction forgets its scan."""
-    (tmp_path / "scan.csv").write_text("x,y,gap\n0,0,5\n")
-    gap = InitialGap.model_validate(
-        {"kind": "initial_gap", "mean": 0.5, "random": {"sd": 0.1, "correlation_length": 20, "seed": 1}}
-    )
-    scene = make_scene(JOINT, gap)
-    near, free = (
-        random_gaps(scene, 9, 2, around=tmp_path / "scan.csv").load(1).g,
-        random_gaps(scene, 9, 2).load(1).g,
-    )
-    far = np.hypot(*JOINT.nodes.T) > 160
-    np.testing.assert_allclose(near[far], free[far], atol=1e-9)
-    assert near[0] == pytest.approx(5.0, abs=1e-3)

@@ -60,7 +60,7 @@ def test_a_band_is_factored_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.usefixtures("library")
-@pytest.mark.parametrize("seed", seeds(3, 12))
+@pytest.mark.parametrize("seed", seeds(1, 12))
 def test_each_factor_solves_as_the_dense_matrix_does(seed: int) -> None:
     random = np.random.default_rng(seed)
     n = int(random.integers(300, 500))
@@ -100,15 +100,14 @@ def test_small_matrices_of_any_band(n: int, half: int, seed: int) -> None:
         close(factor.solve(b), np.linalg.solve(dense, b))
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_the_size_of_a_factor_is_known_before_it_is_made(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_size_of_a_factor_is_known_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """Exactly for a band; within a factor of 2½ for a grid without one, in the plane and in space."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     far, nodes = scattered(random, 400, 3)
     for K, where in ((band_matrix(random, 400, 3), None), (far, None), (far, nodes)):
         block = sparse_block(K, where)
         assert block.factor_nonzeros == sum(array.size for array in block.factor())
-    for shape in ((290, 280 + 10 * seed), (25, 24, 23 + seed)):
+    for shape in ((290, 280), (25, 24, 23)):
         K = renumbered(grid(*shape), random.permutation(int(np.prod(shape))))
         block = sparse_block(K)
         assert isinstance(block, GeneralBlock)
@@ -132,7 +131,7 @@ def grid(*shape: int) -> sp.csc_array:
 
 
 @pytest.mark.usefixtures("library")
-@pytest.mark.parametrize("seed", seeds(3, 12))
+@pytest.mark.parametrize("seed", seeds(1, 12))
 def test_a_mechanism_is_named_by_an_unknown_that_moves(seed: int) -> None:
     """A chain that nothing holds, among unknowns that are held, in each of the three kinds of factor."""
     random = np.random.default_rng(seed)

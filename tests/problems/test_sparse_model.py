@@ -119,19 +119,6 @@ def test_the_numbering_is_one_and_narrow(name: str) -> None:
         assert half_bandwidth(K) <= 4 * (min(along, across) + 2) - 1
 
 
-@pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("clamped", [["north"], ["south", "north"]])
-def test_what_is_built_in_is_left_out(turned: bool, clamped: list[str]) -> None:
-    nodes = (4, 9) if turned else (9, 4)
-    one = {"south": END, "north": END, "clamped": clamped}
-    scene = make_scene(make_joint(one, HELD | {"name": "b"}, contacts=[("a", "b")], nodes=nodes))
-    model = prepared(scene, form="sparse").assembly
-    lines = nodes[1] + 4 - len(clamped), nodes[1] + 2 - 1
-    assert [K.shape[0] for K in model.K.matrices] == [4 * nodes[0] * count for count in lines]
-    np.testing.assert_array_equal(model.nodes[model.junction], np.tile(scene.joint.nodes, (2, 1)))
-    check_same(scene)
-
-
 SHORT, LONG = {"length": 90.0, "elements": 2}, {"length": 250.0, "elements": 4}
 SHAPES: list[dict[str, Any]] = [
     {"south": SHORT, "clamped": ["south"]},

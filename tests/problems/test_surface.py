@@ -103,8 +103,8 @@ def test_a_missing_node_changes_the_elements_around_it_alone() -> None:
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])
 @pytest.mark.parametrize("long", [1.0, 4.0])
-@pytest.mark.parametrize("count", [8, 11, 16, 24])
-@pytest.mark.parametrize("radius", [9.0, 15.0, 24.0])
+@pytest.mark.parametrize("count", [8, 11, 24])
+@pytest.mark.parametrize("radius", [9.0, 24.0])
 def test_a_round_hole_stays_open(radius: float, count: int, long: float, moved: float) -> None:
     """Nodes on a circle in a mesh of 6 mm, regular or not, its elements square or four times longer."""
     random = np.random.default_rng(9)

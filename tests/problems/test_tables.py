@@ -32,6 +32,7 @@ READ = {
     "a row of units": "x,y,gap\nm,mm,um\n0,0,100\n2,0,900\n1.25,300,500\n",
     "missing": "x,y,gap\n0,0,0.1\n5,5,9999\n2000,0,0.9\n6,6,NaN\n1250,300,0.5\n7,7,\n8,8,-1\n",
     "names that begin with #": "name,x,y,gap\n#1,0,0,.1\n#2,2000,0,.9\n# 3,1250,300,.5\n",
+    "tabs": "X\tY\tGap\n0\t0\t0,1\n2000\t0\t0,9\n1250\t300\t0,5\n",
     "minus": "x;y;gap\n0;0;.1\n2000;\u22120;.9\n1250;300;.5\n",
 }
 BLANKS = READ["blanks and apostrophes"].replace("1\u202f250", "1'250")
