@@ -5,6 +5,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from forked_processes import fork_measuring_processes
@@ -45,6 +46,18 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     suite = read_suite(str(tiny_joint.write_suite(folder, tolerances=[1e-6, 1e-8])))
     assert said_by(run, suite, folder / "finished")[0] == 0
     return folder / "finished"
+
+
+@pytest.fixture(scope="session")
+def cluster() -> Iterator[Any]:
+    """Two workers of Dask; a task that kills two is left. Dask sets nothing in the environment here."""
+    dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
+    settings = {"distributed.scheduler.allowed-failures": 1, "distributed.nanny.pre-spawn-environ": {}}
+    with (
+        dask.config.set(settings),
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made,
+    ):
+        yield made
 
 
 @pytest.fixture

@@ -10,6 +10,8 @@ from report.document.blocks import Section, Table
 from report.results.reader import Results, read
 
 GRIDS = {4386: (129, 17), 6112: (191, 16), 11308: (257, 22)}
+#: Numbers of active contacts in made-up scenes, by n.
+SIZES = {4386: [100, 1500], 11308: [2500]}
 COND = {4386: 2.6303e6, 6112: 1.112e7, 11308: 1.7692e7}
 
 #: solver, form, seconds of solve at n = 4386 and half contact, growth with contact, error in mm

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,7 @@ import pytest
 from harness.conformance.known_problems import known_problems
 from harness.solving.session import no_answer
 from harness.solving.solver_answer import LARGEST_DETAILS, InvalidAnswer, checked, examined, figures
-from problems.errors import InputError
 from problems.forms.problem import Problem, in_form
-from problems.input.tables import TableOptions
-from problems.load_cases.measured_gaps import _read
 from solvers.base import Answer, Status
 
 
@@ -110,23 +106,7 @@ def test_the_gate_makes_plain_types_that_nobody_can_change() -> None:
         ("solved", {"status": "Solved"}, None),
     ],
 )
-def test_a_row_has_the_cause_in_the_words_of_the_library(
-    status: Status, details: dict[str, str], cause: str | None
-) -> None:
+def test_the_cause_in_library_words(status: Status, details: dict[str, str], cause: str | None) -> None:
     answer = Answer(status, None, details=details)
     assert figures(answer)["message"] == cause
     assert str(no_answer("osqp", answer)).count(": ".join(filter(None, (status, cause)))) == 1
-
-
-@pytest.mark.parametrize("content", [b"", b"hello", b"PK\3\4cut", b"\x93NUMPY"])
-@pytest.mark.parametrize("suffix", [".npz", ".npy"])
-def test_an_unreadable_file_is_told_without_names_of_python(
-    content: bytes, suffix: str, tmp_path: Path
-) -> None:
-    path = tmp_path / f"gaps{suffix}"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=path.name) as raised:
-        _read(path, 3, TableOptions())
-    assert "Error" not in str(raised.value)
-    assert "pickle" not in str(raised.value)
-    assert "BadZip" not in str(raised.value)

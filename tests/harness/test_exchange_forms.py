@@ -98,9 +98,7 @@ def test_one_npz_holds_the_same(form: Form, scenes: Path, tmp_path: Path) -> Non
         ([], "--format: format = None: one of"),
     ],
 )
-def test_options_that_do_not_go_together(
-    words: list[str], message: str, scenes: Path, tmp_path: Path
-) -> None:
+def test_options_that_exclude_others(words: list[str], message: str, scenes: Path, tmp_path: Path) -> None:
     done = harness("export", scenes / "tiny.npz", *words, "--out", tmp_path / "p")
     assert done.exit_code == 2
     assert message in done.stderr
@@ -146,9 +144,7 @@ def written(path: Path, x: np.ndarray, name: str = "x") -> Path:
     ("name", "shift", "code"),
     [("x.npz", 2e-7, 1), ("x.csv", 2e-7, 1), ("x.npz", 5e-8, 0)],
 )
-def test_an_answer_is_judged_by_its_displacements(
-    name: str, shift: float, code: int, scenes: Path, answer: Any, tmp_path: Path
-) -> None:
+def test_displacements(name: str, shift: float, code: int, scenes: Path, answer: Any, tmp_path: Path) -> None:
     x = answer[0].copy()
     x[7] += shift
     done = harness("judge", written(tmp_path / name, x), scenes / "tiny.npz")
@@ -157,9 +153,7 @@ def test_an_answer_is_judged_by_its_displacements(
     assert f"{shift:.3e} at entry 7" in done.stdout
 
 
-def test_forces_alone_are_judged_by_the_displacements_that_they_give(
-    scenes: Path, answer: Any, tmp_path: Path
-) -> None:
+def test_forces_alone_are_judged_by_their_displacements(scenes: Path, answer: Any, tmp_path: Path) -> None:
     _, lam = answer
     path = written(tmp_path / "lam.csv", lam, "lam")
     done = harness("judge", path, scenes / "tiny.npz")
@@ -169,9 +163,7 @@ def test_forces_alone_are_judged_by_the_displacements_that_they_give(
     assert harness("judge", path, scenes / "tiny.npz").exit_code == 1
 
 
-def test_the_tables_of_solve_are_answers(
-    scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tables_of_solve_are_answers(scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     assert harness("solve", scenes / "strip.toml", "--out", tmp_path).exit_code == 0
     for name in ("nodes.csv", "contacts.csv", "solution.npz"):
@@ -182,9 +174,7 @@ def test_the_tables_of_solve_are_answers(
     ("limit", "code", "said"),
     [("1e-16", 3, "Cannot be judged"), ("0", 2, "positive"), ("nan", 2, "positive")],
 )
-def test_a_limit_that_is_none_or_below_what_is_proven(
-    limit: str, code: int, said: str, scenes: Path, answer: Any, tmp_path: Path
-) -> None:
+def test_a_wrong_limit(limit: str, code: int, said: str, scenes: Path, answer: Any, tmp_path: Path) -> None:
     done = harness("judge", written(tmp_path / "x.npz", answer[0]), scenes / "tiny.npz", "--limit", limit)
     assert done.exit_code == code
     assert said in done.output

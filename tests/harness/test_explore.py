@@ -172,17 +172,6 @@ def test_a_saved_scene_finds_its_files(tmp_path: Path) -> None:
     assert Settings.of(scene_of(there / "scene.toml")).preload == 77.0
 
 
-@pytest.mark.parametrize("name", ["drawn/4386/3", "gallery/measured-gap"])
-def test_packaged_scenes_are_saved_too(name: str, tmp_path: Path) -> None:
-    scene = scene_of(Path(name)) if Path(name).suffix else read_scene(name)
-    assert isinstance(scene, JointScene)
-    if not any(effect.kind == "fasteners" for effect in scene.effects):
-        pytest.skip("it has no fasteners")
-    settings = Settings.of(scene)
-    (tmp_path / "scene.toml").write_text(edited(name, tmp_path, settings.write_to, CHANGED))
-    assert Settings.of(scene_of(tmp_path / "scene.toml")) == settings
-
-
 @pytest.mark.parametrize(
     ("scene", "said"),
     [("hard/duplicates/2e-05", "own matrices"), ("gallery/heavy-sheet-on-tool", "no fasteners")],

@@ -118,9 +118,7 @@ def test_the_rule(
 
 
 @pytest.mark.parametrize(("taken", "asked"), [(DENSE, None), (FORMS, "dual"), (DENSE, "sparse")])
-def test_a_form_that_does_not_fit_or_is_not_taken_is_refused(
-    taken: Any, asked: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_form_that_does_not_fit_is_refused(taken: Any, asked: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     machine_of(1000, monkeypatch)
     with pytest.raises(InputError, match="--form sparse" if asked != "sparse" else "the solver takes"):
         chosen_form(LARGE, taken, asked)

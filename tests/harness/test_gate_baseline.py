@@ -30,9 +30,7 @@ def answers(directory: Path) -> list[Path]:
 @pytest.mark.parametrize(
     ("shift", "margin", "code"), [(0.0, 10, 0), (9e-8, 10, 1), (9e-8, 1e7, 0), (5e-13, 10, 0), (2e-7, 1e9, 1)]
 )
-def test_digits_lost_within_the_limit_are_news(
-    finished: Path, copy: Path, shift: float, margin: float, code: int
-) -> None:
+def test_lost_digits_are_reported(finished: Path, copy: Path, shift: float, margin: float, code: int) -> None:
     """The solver's own error is some 1e-15 mm: what counts below 1e-13 mm, the floor, is the floor."""
     moved(answers(copy)[0], shift)
     assert gate(copy).exit_code == (1 if shift > 1e-7 else 0)
@@ -42,9 +40,7 @@ def test_digits_lost_within_the_limit_are_news(
         assert "2 of them are in" in done.stdout
 
 
-def test_no_scene_is_opened_for_answers_that_were_not_kept(
-    copy: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_scene_is_opened_without_kept_answers(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.rmtree(copy / "answers")
     monkeypatch.setattr("harness.verification.gate.reference_problem", None)
     done = gate(copy)
@@ -53,9 +49,7 @@ def test_no_scene_is_opened_for_answers_that_were_not_kept(
 
 
 @pytest.mark.parametrize("errors", [(3e-9, 2e-9, 1e-9), (1e-9, 2e-9, 3e-9)])
-def test_the_standard_is_the_largest_error_of_the_repeats(
-    finished: Path, copy: Path, errors: tuple[float, ...]
-) -> None:
+def test_the_largest_error_of_repeats_counts(finished: Path, copy: Path, errors: tuple[float, ...]) -> None:
     first = rows_of(copy)[0]
     rows = [first | {"repeat": k, "displacement_error_mm": error} for k, error in enumerate(errors)]
     records.rewrite(copy / records.MEASUREMENTS, rows)
@@ -65,9 +59,7 @@ def test_the_standard_is_the_largest_error_of_the_repeats(
 
 @pytest.mark.parametrize(("bound", "then"), [(1e-9, 1e-13), (1e-13, 1e-9)])
 @pytest.mark.parametrize(("error", "exceeded"), [(0.9e-8, False), (1.1e-8, True)])
-def test_below_either_bound_no_digit_is_lost(
-    finished: Path, bound: float, then: float, error: float, exceeded: bool
-) -> None:
+def test_none_below_bounds(finished: Path, bound: float, then: float, error: float, exceeded: bool) -> None:
     """The margin is 10, the error was 1e-12 mm."""
     row = rows_of(finished)[0]
     baseline = Baseline("then", 10.0, {measurement(row): (1e-12, then)})
@@ -84,9 +76,7 @@ def test_a_baseline_outside_its_limit_is_no_standard(finished: Path, copy: Path,
 
 
 @pytest.mark.parametrize("error", [None, float("nan")])
-def test_a_baseline_without_errors_compares_nothing(
-    finished: Path, tmp_path: Path, error: float | None
-) -> None:
+def test_a_baseline_needs_errors_to_compare(finished: Path, tmp_path: Path, error: float | None) -> None:
     other = changed(Path(shutil.copytree(finished, tmp_path / "other")), displacement_error_mm=error)
     assert gate(finished, "--baseline", other).exit_code == 3
 
@@ -103,9 +93,7 @@ def test_a_baseline_without_errors_compares_nothing(
         ("--baseline", "BEFORE", "--json", "BEFORE/suite.toml"),
     ],
 )
-def test_an_output_is_no_input_and_no_other_output(
-    finished: Path, copy: Path, words: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_outputs_replace_no_file(finished: Path, copy: Path, words: tuple[str, ...], tmp_path: Path) -> None:
     (copy / "link.json").symlink_to(copy / "suite.toml")
     (copy / "hard").touch()
     (copy / "harder").hardlink_to(copy / "hard")
@@ -124,9 +112,7 @@ def test_an_output_is_no_input_and_no_other_output(
         ({"limit_mm": 1e-3}, "another limit"),
     ],
 )
-def test_a_baseline_of_other_measurements_is_refused(
-    finished: Path, copy: Path, figures: dict[str, Any], message: str
-) -> None:
+def test_other_baseline_is_refused(finished: Path, copy: Path, figures: dict[str, Any], message: str) -> None:
     done = gate(finished, "--baseline", changed(copy, **figures))
     assert done.exit_code == 5
     assert message in done.stderr

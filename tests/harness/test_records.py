@@ -3,25 +3,20 @@
 import json
 import os
 from dataclasses import fields
-from io import StringIO
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
-from rich.console import Console
-from synthetic_results import no_answer, row
+from published_runs import DIRECTORIES
 
 from harness.results import records, schema
-from harness.terminal.console import Display
 from harness.verification.judge import Judgement
 from problems.errors import InputError
 from problems.ladders import LADDERS
 from problems.random_scenes import EXAMPLES
 from solvers.base import Status
 
-PUBLISHED = Path(__file__).parents[2] / "results" / "published"
-RESULTS = sorted(path.parent.name for path in PUBLISHED.glob("*/measurements.jsonl"))
 TYPES = {"number": (int, float), "text": str, "flag": bool, "object": dict}
 
 
@@ -68,40 +63,22 @@ def test_a_full_disk_leaves_the_rows_before(path: Path, monkeypatch: pytest.Monk
     def full(fd: int) -> None:
         raise OSError(28, "No space left on device")
 
-    before = path.read_bytes()
+    whole = path.read_bytes()
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
         with pytest.raises(OSError, match="No space left"):
             records.append(path, {"key": "k3"})
         with pytest.raises(OSError, match="No space left"):
             records.rewrite(path, [])
-    assert path.read_bytes() == before
-
-
-def test_a_directory_takes_one_run_at_a_time(tmp_path: Path) -> None:
-    def enter_twice() -> None:
-        with records.locked(tmp_path / "out"), records.locked(tmp_path / "out"):
-            raise AssertionError("held twice")
-
-    with pytest.raises(InputError, match="another run is writing here"):
-        enter_twice()
-    with records.locked(tmp_path / "out"):
-        pass
-
-
-def test_an_unwritable_directory_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)  # a long path is said shortened
-    Path("file").touch()
-    with pytest.raises(InputError, match=r"file/out'.*cannot be written"):
-        records.locked(Path("file/out")).__enter__()
+    assert path.read_bytes() == whole
 
 
 # --- the names of a row's fields, in one place for the harness and the report ---------------------------
 
 
-@pytest.mark.parametrize("name", RESULTS)
-def test_every_field_of_the_published_rows_is_in_the_schema_with_its_kind(name: str) -> None:
-    for line in (PUBLISHED / name / "measurements.jsonl").read_text("utf-8").splitlines():
+@pytest.mark.parametrize("directory", DIRECTORIES, ids=lambda path: path.name)
+def test_published_rows_are_of_the_schema(directory: Path) -> None:
+    for line in (directory / records.MEASUREMENTS).read_text("utf-8").splitlines():
         row = json.loads(line)
         assert row["status"] in schema.STATUSES
         assert row["verdict"] in schema.VERDICTS
@@ -117,18 +94,3 @@ def test_the_vocabulary_is_that_of_solvers_judge_and_ladders() -> None:
     assert schema.LADDERS == LADDERS
     assert all(name.startswith(schema.DRAWN) for name in EXAMPLES)
     assert schema.ANSWERED == ("within", "outside", "cannot_be_judged")
-
-
-def test_a_line_says_the_outcome_and_why() -> None:
-    times = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "solve_s", "form_s"), 0.25)
-    solved = row(solver="gi", iterations=7, displacement_error_mm=2e-11, **times)
-    crashed = solved | no_answer("crashed") | {"setup_s": 0.25, "message": "killed by SIGSEGV\nmore"}
-    shown = StringIO()
-    with Display(Console(file=shown, width=60), 2, 0) as display:
-        display.finished(solved)
-        display.finished(crashed)
-    heading, first, second, why = filter(str.strip, shown.getvalue().splitlines())
-    assert heading.split()[:2] == ["scene", "solver"]
-    assert " ".join(first.split()) == "4386/0052 gi dual 1e-09 2 solved 7 0.50 0.75 2.0e-11 within"
-    assert " ".join(second.split()) == "4386/0052 gi dual 1e-09 2 crashed – – – – no_answer"
-    assert why.strip() == "killed by SIGSEGV"

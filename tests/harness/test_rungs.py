@@ -51,9 +51,7 @@ def test_a_refused_rung_is_recorded_and_not_measured(directory: Path, suite: Sui
 
 
 @pytest.mark.parametrize(("share", "code"), [(0.9, 0), (1.1, 1)])
-def test_the_gate_makes_out_the_limit_itself(
-    directory: Path, share: float, code: int, tmp_path: Path
-) -> None:
+def test_the_gate_finds_the_limit_itself(directory: Path, share: float, code: int, tmp_path: Path) -> None:
     copy = Path(shutil.copytree(directory, tmp_path / "copy"))
     (row,) = rows_of(copy)
     moved(copy / row["answer"], share * row["limit_mm"], 5)

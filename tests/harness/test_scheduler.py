@@ -60,19 +60,6 @@ def job(tmp_path: Path) -> Job:
     return Job(scene, random_gaps(scene, CASES, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)
 
 
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Any]:
-    """Two workers, processes of their own; one that is killed is replaced, a task that kills two is left."""
-    import dask
-    import distributed
-
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made,
-    ):
-        yield made
-
-
 def pids(cluster: Any) -> list[int]:
     import distributed
 
@@ -147,9 +134,7 @@ def test_a_number_of_workers_that_cannot_be(wrong: str) -> None:
 @pytest.mark.parametrize(
     ("where", "each"), [("local:2", 4), ("local:3", 2), ("local:9", 1), ("tcp://a:1", None), (None, None)]
 )
-def test_local_workers_share_the_cores(
-    where: str | None, each: int | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_share_cores(where: str | None, each: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scheduler, "usable_cores", lambda: 8)
     assert scheduler.threads_per_worker(where) == each
 
@@ -165,9 +150,7 @@ def test_local_workers_keep_the_memory_of_arrays(monkeypatch: pytest.MonkeyPatch
 
 
 @needs_dask
-def test_a_scheduler_that_does_not_answer_leaves_the_solved_cases(
-    job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_silent_scheduler_keeps_cases(job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.measurement.scheduler.CONNECT_TIMEOUT", "1s")
     out = tmp_path / "out"
     with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9.*does not answer"):
@@ -181,9 +164,7 @@ def test_a_scheduler_that_does_not_answer_leaves_the_solved_cases(
 
 
 @needs_dask
-def test_workers_that_will_not_do_are_named(
-    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wrong_workers_are_named(cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The driver thinks that it has other packages than its workers; it says which, of each worker."""
     monkeypatch.setattr(scheduler, "installed_version", lambda name: (VERSIONS | {"scipy": "0.1"})[name])
     with pytest.raises(InputError) as raised, workers(cluster.scheduler_address, QUIET):

@@ -49,16 +49,26 @@ def test_the_search_ends_at_the_first_tolerance_that_suffices(tmp_path: Path) ->
     rows = measured(suite, tmp_path / "out")
     first = [row for row in rows if row["repeat"] == 0]
     tried = {row["tolerance"]: row["verdict"] for row in first}
-    found = max(tolerance for tolerance, verdict in tried.items() if verdict == "within")
+    enough = max(tolerance for tolerance, verdict in tried.items() if verdict == "within")
+    looser = DECADES[DECADES.index(enough) - 1]
     assert first[0]["tolerance"] == START
-    assert tried[DECADES[DECADES.index(found) - 1]] == "outside"
-    # Only what was found is repeated; and nothing is left for the same command.
-    assert [row["tolerance"] for row in rows if row["repeat"] == 1] == [found]
+    assert tried[looser] == "outside"
+    # Only what is enough is repeated; and nothing is left for the same command.
+    assert [row["tolerance"] for row in rows if row["repeat"] == 1] == [enough]
     assert measured(suite, tmp_path / "out") == rows
 
     results = read(tmp_path / "out")
     (cell,) = results.cells.to_dict("records")
-    assert (cell["label"], cell["tolerance"], cell["repeats"]) == ("rough (dual)", found, 2)
+    assert (cell["label"], cell["tolerance"], cell["repeats"]) == ("rough (dual)", enough, 2)
+
+    # On a second scene it starts where it ended: the tolerance tried last, and the one beside it.
+    data = suite.model_dump(exclude_none=True) | {"repeats": 1}
+    second = tmp_path / "second.npz"
+    second.write_bytes(Path(*suite.scenes).read_bytes())
+    data["scenes"] = [*suite.scenes, str(second)]
+    rows = measured(suite_from(data, tmp_path / "s.toml"), tmp_path / "out")
+    assert [row["tolerance"] for row in rows if row["scene"] == "second"] == [looser, enough]
+    assert read(tmp_path / "out").cells["tolerance"].nunique() == 1
 
 
 def test_it_ends_where_the_solver_gives_up(tmp_path: Path) -> None:
@@ -69,23 +79,6 @@ def test_it_ends_where_the_solver_gives_up(tmp_path: Path) -> None:
     }
     (cell,) = read(tmp_path / "out").cells.to_dict("records")
     assert cell["verdict"] == "outside"
-
-
-def test_the_search_starts_where_it_ended_on_the_scene_before(tmp_path: Path) -> None:
-    """On a second scene: the tolerance tried last on the first, and the one beside it that sufficed."""
-    suite = suite_of(tmp_path, LOOSE)
-    data = suite.model_dump(exclude_none=True)
-    (first,) = suite.scenes
-    second = tmp_path / "second.npz"
-    second.write_bytes(Path(first).read_bytes())
-    rows = measured(
-        suite_from(data | {"scenes": [first, str(second)]}, tmp_path / "s.toml"), tmp_path / "out"
-    )
-    found = max(row["tolerance"] for row in rows if row["scene"] != "second" and row["verdict"] == "within")
-    tried = [row["tolerance"] for row in rows if row["scene"] == "second"]
-    assert tried == [DECADES[DECADES.index(found) - 1], found]
-    cells = read(tmp_path / "out").cells
-    assert cells["tolerance"].nunique() == 1
 
 
 @pytest.mark.parametrize(
@@ -134,9 +127,7 @@ def test_a_search_after_one_on_another_scene_starts_at_its_last_tolerance(tmp_pa
         ([("piqp", "library", 1.5, "within"), ("rough", "library", 1.0, "within")], 15.0, "10 × piqp"),
     ],
 )
-def test_who_is_far_behind_is_stopped(
-    tmp_path: Path, others: list[tuple[str, str, float, str]], limit_s: float, stop: str
-) -> None:
+def test_stops(tmp_path: Path, others: list[tuple[str, str, float, str]], limit_s: float, stop: str) -> None:
     suite = suite_of(tmp_path).model_copy(update={"stop_at_times_fastest": 10.0})
     m = replace(expand(suite)[0], time_limit_s=60.0)
     rows = [
@@ -145,8 +136,8 @@ def test_who_is_far_behind_is_stopped(
         | dict(zip(("solver", "form", "variant"), name.split(), strict=False))
         for name, group, seconds, verdict in others
     ]
-    found, why = time_limit(m, rows)
-    assert found == pytest.approx(limit_s)
+    limit, why = time_limit(m, rows)
+    assert limit == pytest.approx(limit_s)
     assert stop in why
     assert bool(why) == bool(stop)
 

@@ -66,9 +66,7 @@ def gaps_of(directory: str) -> np.ndarray:
     return series_file.StoredGaps(Path(directory), 45)[[row["case"] for row in rows_of(directory)]]
 
 
-def test_rows_and_gaps_against_nnls_on_scenes_of_their_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_and_gaps_against_nnls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each case solved again as the scene that its row names, by another method; with the report."""
     monkeypatch.undo()
     series("--cases", "70", "--seed", "5", "--check", "10", "--out", "plain")
@@ -225,9 +223,7 @@ def results_of(count: int, check: int, **solver: Any) -> list[Result]:
         ("big_details", ["outside", "cannot_be_judged"] * 2),  # its λ is zero; every second case is checked
     ],
 )
-def test_a_solver_that_fails_is_a_row_and_its_answer_is_not_vouched_for(
-    fault: str, verdicts: list[str]
-) -> None:
+def test_a_solver_that_fails_is_a_row(fault: str, verdicts: list[str]) -> None:
     Path("faulty.py").write_text(tiny_joint.FAULTY)
     results = results_of(4, 2, options={"fault": fault}, plugin=Path("faulty.py"))
     assert [result.row["verdict"] for result in results] == verdicts

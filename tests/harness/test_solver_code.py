@@ -125,9 +125,7 @@ class Helped(Solver):
         ("import broken", "broken.py"),
     ],
 )
-def test_a_plugin_is_another_when_its_helper_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, helper: str
-) -> None:
+def test_helpers_of_a_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, helper: str) -> None:
     """In the fingerprint and in the version, however lazily it is imported; other files do not count."""
     monkeypatch.setattr("sys.path", [str(tmp_path), *sys.path])
     files = ["helper.py", "my-helper.py", "lib/far.py", "compiled.so", "other.py", "data.json"]

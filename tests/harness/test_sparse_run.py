@@ -76,9 +76,7 @@ def test_a_scene_has_one_row_with_the_facts_of_both_roads(finished: Path) -> Non
 
 
 @pytest.mark.parametrize("named", ["mine", "newton"])
-def test_a_reference_is_proven_from_the_first_answer_that_is_one(
-    named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_reference_from_first_answer(named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not from one that is cut off, nor from one with NaN."""
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     path = str(write_strip(tmp_path))

@@ -104,9 +104,7 @@ def test_versions_side_by_side_and_again(folder: Path, tmp_path: Path) -> None:
     assert "no attribute 'FACTOR'" in rows["2.0"]["message"]
 
 
-def test_another_copy_on_the_path_is_not_taken_for_the_version(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_copy_on_the_path(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "fakelib.py").write_text("FACTOR = 1.0")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     asked = ("--solver", "fake", "--with", "fakelib==1.0", "--out", tmp_path / "out")

@@ -85,7 +85,3 @@ def test_many_marks_hide_no_field() -> None:
 def test_what_is_larger_than_allowed_looks_like_nothing_else() -> None:
     others = [lab(colour, "normal") for colour in (MARK, CLOSED, RIM)]
     assert min(np.linalg.norm(lab(LARGER, "normal") - other) for other in others) > 40
-
-
-def test_a_scale_of_roots_says_so() -> None:
-    assert "√" in rooted("force, N", "magma_r", np.ones(3)).label

@@ -67,9 +67,7 @@ def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
     ("solver", "form", "first"),
     [("newton", "dual", 11.9), ("gi", "primal", 11.9), ("clarabel", "primal", 8.9)],
 )
-def test_of_a_run_that_does_not_say_its_form_tells_the_stages(
-    tmp_path: Path, solver: str, form: str, first: float
-) -> None:
+def test_the_form_tells_the_stages(tmp_path: Path, solver: str, form: str, first: float) -> None:
     """One that was stopped does not."""
     rows = [sparse(solver="other"), dense(solver="another"), dense(solver=solver, form=form, stages=None)]
     assert totals(lines(tmp_path, rows).loc[f"{solver} ({form})"])[0] == pytest.approx(first)

@@ -51,9 +51,7 @@ def test_what_became_worse_from_version_to_version(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(1.05, "–"), (1.2, "worse: 1.20 times as long")])
-def test_a_slowdown_counts_from_ten_percent_beyond_the_spread(
-    tmp_path: Path, seconds: float, said: str
-) -> None:
+def test_a_slowdown_counts_beyond_the_spread(tmp_path: Path, seconds: float, said: str) -> None:
     rows = [of(v, repeat=k, solve_s=s) for v, s in (("1", 1.0), ("2", seconds)) for k in range(3)]
     _, table = told(tmp_path, rows).blocks
     assert shown(table)[-1][-1] == said

@@ -67,9 +67,7 @@ def texts_of(figure: Figure) -> list[Text]:
         (12.0, 9.0, 5, 2, "small"),
     ],
 )
-def test_nothing_is_cut_off_or_covered(
-    width: float, height: float, parts: int, kinds: int, name: str
-) -> None:
+def test_nothing_is_cut_or_covered(width: float, height: float, parts: int, kinds: int, name: str) -> None:
     drawn = figures(width, height, parts, kinds, name)
     assert list(drawn) == ["gap", "forces", "displacement"]
     for figure in drawn.values():

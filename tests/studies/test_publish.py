@@ -57,9 +57,7 @@ def good(words: Sequence[str]) -> int:
     return 0
 
 
-def test_what_is_published_are_suites_and_series_each_once(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_suites_and_series_are_published_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert set(published.NAMES) <= {*suite_names(), *published.SERIES}
     assert len(set(published.NAMES)) == len(published.NAMES)
     with pytest.raises(SystemExit, match="2"):
@@ -67,9 +65,7 @@ def test_what_is_published_are_suites_and_series_each_once(
     assert "unknown: sped" in capsys.readouterr().err
 
 
-def test_what_is_whole_takes_the_place_of_the_old_and_is_not_measured_again(
-    there: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_whole_takes_the_place_of_the_old(there: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert publish(monkeypatch, good) == (0, SUITES)
     for name in SUITES:
         assert published.is_of(published.rows_of(there / name), CODE)
@@ -79,9 +75,7 @@ def test_what_is_whole_takes_the_place_of_the_old_and_is_not_measured_again(
     assert publish(monkeypatch, good) == (0, [])
 
 
-def test_a_suite_that_is_not_whole_leaves_the_old_and_is_continued(
-    there: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_unfinished_suite_leaves_the_old(there: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def stopped(words: Sequence[str]) -> int:
         if words[1] == "scaling":
             measured(Path(words[-1]), row())
@@ -95,9 +89,7 @@ def test_a_suite_that_is_not_whole_leaves_the_old_and_is_continued(
     assert len(published.rows_of(there / "scaling")) == 3
 
 
-def test_one_that_fails_or_is_of_changed_code_is_not_published_and_the_others_are(
-    there: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_that_fails_is_not_published(there: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert publish(monkeypatch, lambda words: 1 if words[1] == "default" else good(words))[0] == 1
     assert published.is_of(published.rows_of(there / "default"), "b" * 40)
     assert published.is_of(published.rows_of(there / "scaling"), CODE)
@@ -110,9 +102,7 @@ def test_one_that_fails_or_is_of_changed_code_is_not_published_and_the_others_ar
     assert published.is_of(published.rows_of(there / "default"), "b" * 40)
 
 
-def test_scenes_large_answers_gaps_and_locks_are_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scenes_and_large_answers_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
     for name, size in (("small", 1000), ("large", published.KEPT_KIB * 2**10 + 1)):
         folder = tmp_path / name
@@ -126,9 +116,7 @@ def test_scenes_large_answers_gaps_and_locks_are_left_out(
 
 
 @pytest.mark.parametrize("known", [(CODE, False), ("0.1.0", None)])
-def test_code_of_no_commit_is_refused(
-    there: Path, monkeypatch: pytest.MonkeyPatch, known: tuple[str, bool | None]
-) -> None:
+def test_commit_needed(there: Path, monkeypatch: pytest.MonkeyPatch, known: tuple[str, bool | None]) -> None:
     monkeypatch.setattr(published, "commit", lambda: known)
     with pytest.raises(SystemExit, match="2"):
         publish(monkeypatch, good)

@@ -32,9 +32,7 @@ case "$3" in run) exit $RUN ;; gate) exit $GATE ;; esac
 @pytest.mark.parametrize(
     ("run", "gate", "code"), [(0, 0, 0), (0, 1, 1), (1, 1, 1), (3, 3, 3), (2, 0, 2), (130, 0, 130), (0, 5, 5)]
 )
-def test_the_script_calls_three_commands_and_ends_as_the_gate_does(
-    run: int, gate: int, code: int, tmp_path: Path
-) -> None:
+def test_the_script_ends_as_the_gate_does(run: int, gate: int, code: int, tmp_path: Path) -> None:
     """What `run` could not measure is for the gate to say; its wrong usage, or its end by Ctrl-C, is not."""
     stub = tmp_path / "python"
     stub.write_text(STUB)

@@ -34,9 +34,7 @@ COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
 JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
-def test_the_scene_of_the_page_is_solved_and_drawn_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_scene_of_the_page_is_drawn_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its parts meet; the borders of the pictures are white, so that no title is cut."""
     monkeypatch.setattr("report.figures.style.DPI", 160)
     (tmp_path / "scene.toml").write_text(JOINT[1])

@@ -26,9 +26,7 @@ def test_every_example_is_tested() -> None:
 
 
 @pytest.mark.parametrize("name", PRINTED)
-def test_an_example_prints_its_number(
-    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_number(name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", [name])  # else a word of pytest's names its file
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     (line,) = capsys.readouterr().out.splitlines()

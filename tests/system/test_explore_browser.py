@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 from small_joints import two_parts
-from test_page_browser import chromium  # noqa: F401
 
 from harness import solve
 from problems.scene_files import read_scene
@@ -118,7 +117,7 @@ def saved(driver: Any, folder: Path, name: str) -> Path:
     raise AssertionError(driver.execute_script(MODEL + "return found('Div', 2).text"))
 
 
-def test_fasteners_are_dragged_added_and_saved(chromium: Any, served: tuple[str, Path]) -> None:  # noqa: F811
+def test_fasteners_are_dragged_added_and_saved(chromium: Any, served: tuple[str, Path]) -> None:
     address, folder = served
     opened(chromium, address)
     first = shown(chromium, "3 fasteners", "proven")
@@ -134,7 +133,7 @@ def test_fasteners_are_dragged_added_and_saved(chromium: Any, served: tuple[str,
     assert said_gap(added) == float(f"{solve(str(path)).gap.max():.6g}")
 
 
-def test_sliders_move_the_gap_and_the_limit(chromium: Any, served: tuple[str, Path]) -> None:  # noqa: F811
+def test_sliders_move_the_gap_and_the_limit(chromium: Any, served: tuple[str, Path]) -> None:
     opened(chromium, served[0])
     before = shown(chromium, "proven", "FAIL")
     slide = (
@@ -148,7 +147,7 @@ def test_sliders_move_the_gap_and_the_limit(chromium: Any, served: tuple[str, Pa
     assert said_gap(after) > said_gap(before) + 0.01
 
 
-def test_a_wrong_place_is_refused_in_the_page(chromium: Any, served: tuple[str, Path]) -> None:  # noqa: F811
+def test_a_wrong_place_is_refused_in_the_page(chromium: Any, served: tuple[str, Path]) -> None:
     opened(chromium, served[0])
     script = (
         MODEL

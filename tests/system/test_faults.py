@@ -41,7 +41,7 @@ def test_a_run_killed_again_and_again_ends_with_every_row_once(tmp_path: Path) -
     suite = suite_of(tmp_path, 4)
     out = tmp_path / "out"
     rows, seen = out / records.MEASUREMENTS, b""
-    for enough in (1, 2, 3):
+    for enough in (1, 3):
         going = subprocess.Popen(command(suite, out), cwd=ROOT, stdout=subprocess.DEVNULL)
         wait_for(lambda: rows.exists() and rows.read_bytes().count(b"\n") >= enough)  # noqa: B023
         going.kill()

@@ -295,9 +295,7 @@ def tried(log: Log, draw: Draw, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("part", range(PARTS))
-def test_every_spelling_is_right_or_refused(
-    part: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_spellings_are_right_or_refused(part: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log, count = Log(), draws(150, 20_000)
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     for index in range(part, count, PARTS):

@@ -50,9 +50,7 @@ def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
     resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-def test_every_hostile_file_is_refused_or_right(
-    targets: list[Target], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hostile_files(targets: list[Target], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log, count, save = Log(), draws(100, 20_000), Figure.savefig
     shares = np.array([target.share for target in targets])
     for index in range(count):

@@ -27,9 +27,7 @@ def own_matrices(**changes: Any) -> formats.Data:
 
 
 @pytest.mark.parametrize("own", [True, False])
-def test_a_refused_import_leaves_what_is_there(
-    own: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_refused_import_leaves_files(own: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The input itself, and another file."""
     monkeypatch.chdir(tmp_path)  # a long path would be cut in the message
     bad = Path("bad.npz")
@@ -49,9 +47,7 @@ def test_a_refused_import_leaves_what_is_there(
     ("out", "said"),
     [("mine.npz", "one of the files"), ("link.npz", "one of the files"), ("noext", "must end in .npz")],
 )
-def test_an_import_never_replaces_an_input_and_writes_a_scene_alone(
-    out: str, said: str, tmp_path: Path
-) -> None:
+def test_an_import_replaces_no_input(out: str, said: str, tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", **own_matrices())
     before = (tmp_path / "mine.npz").read_bytes()
     (tmp_path / "link.npz").symlink_to("mine.npz")

@@ -45,9 +45,8 @@ def test_a_page_shows_hostile_text_as_it_is(made: Any, written: Any, tmp_path: P
 
 
 @pytest.mark.parametrize(("made", "written"), MADE)
-@pytest.mark.parametrize("name", ["$x_{$ \\frac{1}{0} $" * 900, "_|\ud800"])
-def test_any_text_is_drawn(made: Any, written: Any, name: str, tmp_path: Path) -> None:
-    page = written(made(tmp_path, name))
+def test_any_text_is_drawn(made: Any, written: Any, tmp_path: Path) -> None:
+    page = written(made(tmp_path, "_|\ud800$x_{$ \\frac{1}{0} $" * 900))
     heading = page.read_text("utf-8").splitlines()[0]
     assert len(heading) < 400
 

@@ -1,8 +1,6 @@
 """The page in a browser: its verdicts against the judge's, sorting, filters, the address, the keyboard."""
 
-import shutil
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlencode
@@ -12,10 +10,10 @@ import pandas as pd
 import pytest
 from commands import harness
 from hostile_texts import HOSTILE, results, solution
-from synthetic_results import everything, row, write_rows
+from published_runs import DIRECTORIES
+from synthetic_results import SIZES, everything, row, write_rows
 from synthetic_results import results as results_of
 from synthetic_series import made as made_series
-from test_page import DIRECTORIES, SCENES
 
 from report.page.page_file import write
 from report.page.run_page_data import run_data
@@ -25,10 +23,6 @@ from report.writers.answer_report import write as write_solution
 from report.writers.series_report import write as write_series
 
 pytestmark = pytest.mark.slow
-FLAGS = (
-    *("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync"),
-    *("disable-background-networking", "disable-component-update", "window-size=1400,1000"),
-)
 SEEN = "[...document.querySelectorAll('#tables td[data-key]')]"
 NAMED = r"td.title.split('\n')[0].split(' on ')"  # label and scene
 #: The figure that has a renderer of a name.
@@ -43,31 +37,10 @@ return [box.left + x_scale.compute(data[x][place]), box.top + y_scale.compute(da
 
 
 @pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """A driver of one without a window or a network; where none is installed, the tests skip."""
-    driver = shutil.which("chromedriver")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if not (driver and chromium):
-        pytest.skip("no Chromium with its driver is installed (apt install chromium-driver)")
-    webdriver = pytest.importorskip("selenium.webdriver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for flag in (*FLAGS, f"user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(f"--{flag}")
-    found = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    found.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # else no event of focus
-    try:
-        yield found
-    finally:
-        found.quit()
-
-
-@pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, Path]:
     """The cells of made-up results, and their page."""
     folder = tmp_path_factory.mktemp("made")
-    found = read(everything(folder, SCENES))
+    found = read(everything(folder, SIZES))
     cells = found.cells[found.cells["status"] != "unsupported"]
     return cells, write(folder / "index.html", "Made up", run_data(found), folder)
 
@@ -125,9 +98,7 @@ def judged(cells: pd.DataFrame, limit: float) -> pd.Series:
     return pd.Series(np.where(cells["verdict"] == "no_answer", "no_answer", np.where(known, verdict, "?")))
 
 
-def test_no_view_of_any_page_has_an_error(
-    chromium: Any, made: tuple[pd.DataFrame, Path], tmp_path: Path
-) -> None:
+def test_no_view_has_an_error(chromium: Any, made: tuple[pd.DataFrame, Path], tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("hostile", "solution", "series", "old", "new", "empty")]
     for folder in folders:
         folder.mkdir()
@@ -154,9 +125,7 @@ def test_no_view_of_any_page_has_an_error(
 
 
 @pytest.mark.parametrize("directory", DIRECTORIES, ids=lambda path: path.name)
-def test_at_their_own_limits_all_published_rows_have_the_judges_verdict(
-    chromium: Any, directory: Path, tmp_path: Path
-) -> None:
+def test_published_rows_have_the_judges_verdict(chromium: Any, directory: Path, tmp_path: Path) -> None:
     opened(chromium, write(tmp_path / "index.html", "Published", run_data(read(directory)), directory))
     count, other = chromium.execute_script(
         "filtered(); const other = CELLS.filter(cell => cell.judged !== cell.verdict);"
@@ -198,9 +167,7 @@ def test_a_column_sorts_up_and_down(chromium: Any, made: tuple[pd.DataFrame, Pat
     assert chromium.execute_script(column)[: len(wanted)] == wanted[::-1]
 
 
-def test_the_ranking_is_by_the_share_within_then_by_time(
-    chromium: Any, made: tuple[pd.DataFrame, Path]
-) -> None:
+def test_the_ranking_is_by_share_then_by_time(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
     cells, page = made
     opened(chromium, page, "limit=9&lines=label")
     good = cells.assign(good=judged(cells, 1e-9).to_numpy() == "within")
