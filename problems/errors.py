@@ -1,7 +1,5 @@
 """Errors that users can correct: each names the file, the key, the value and what is allowed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,5 +53,5 @@ class InputError(ValueError):
         super().__init__("\n".join(map(str, self.faults)))
 
     @classmethod
-    def one(cls, where: object, key: str, value: object, allowed: str) -> InputError:
+    def one(cls, where: object, key: str, value: object, allowed: str) -> "InputError":
         return cls([Fault(str(where), key, value, allowed)])

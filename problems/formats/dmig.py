@@ -10,8 +10,6 @@ of K, and a load or gap that is zero everywhere is not written at all. Without K
 have all its rows, 1 … r, unless it is square.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Nastran's OUTPUT4 by pyyeti: k, a, f, g in double precision; text or binary is read, binary is written."""
 
-from __future__ import annotations
-
 import re
 import tempfile
 import warnings

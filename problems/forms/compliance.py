@@ -2,8 +2,6 @@
 narrow band, from Q itself or from local blocks of it.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -59,7 +57,7 @@ class ApproximateInverse:
     M: BandedInverse | None
     diagonal: Vector
 
-    def scaled(self, R: Vector) -> ApproximateInverse:
+    def scaled(self, R: Vector) -> "ApproximateInverse":
         """The approximate inverse of RQR, R (m,)."""
         M = None if self.M is None else self.M.scaled(1 / R[self.M.order])
         return ApproximateInverse(M, self.diagonal * R**2)

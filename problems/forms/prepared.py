@@ -1,7 +1,5 @@
 """Data preparation, done once per assembly and used by every load case: factors of K, Q, M ≈ Q⁻¹, p."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -126,7 +124,7 @@ class Prepared:
             return of_dense(DenseCompliance(self.Q), self.assembly.contact_nodes)
         return of_products(self.assembly, self.coarser() if self.coarser else self.assembly)
 
-    def scaled(self, D: Vector, R: Vector) -> Prepared:
+    def scaled(self, D: Vector, R: Vector) -> "Prepared":
         """The same problem with DKD, solved by K's factors, and DAR, for powers of two D (n,) and R (m,)."""
         return _Scaled(self, D, R)
 

@@ -18,8 +18,6 @@ tolerance of τ/ℓ on them means τ mm. D and R belong to the assembly, U to a 
 solved from its answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -45,7 +43,7 @@ class Units:
     length: float = 1.0
 
     @classmethod
-    def of(cls, problem: Problem) -> Units:
+    def of(cls, problem: Problem) -> "Units":
         K, A, in_mm = problem.assembly.K, problem.assembly.A, problem.assembly.junction
         D = np.ones(A.shape[0])
         if not (problem.bounded or K.dense):
@@ -63,12 +61,12 @@ class Units:
             return self.problem
         return in_form(self.problem.prepared.scaled(self.D, self.R), self.problem.form)
 
-    def of_loads(self, loads: Sequence[LoadCase]) -> Units:
+    def of_loads(self, loads: Sequence[LoadCase]) -> "Units":
         """The units with the ℓ of these load cases; 1 if there are neither loads nor gaps."""
         size = self._size(loads)
         return replace(self, length=1.0 if size == 0 or _usual(size) else float(power_of_two(size)))
 
-    def followed_by(self, load: LoadCase) -> Units:
+    def followed_by(self, load: LoadCase) -> "Units":
         """The same units, in which earlier answers stay valid; new ones for a load case of another size."""
         size = self._size([load])
         return self if _usual(size / self.length) else self.of_loads([load])

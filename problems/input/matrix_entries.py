@@ -4,8 +4,6 @@ An entry that is listed twice is refused. Where a file says that (i, j) stands f
 listed if they agree; where it does not, a triangle alone is refused. |K_ij − K_ji| ≤ SYMMETRY · √(K_ii K_jj).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from io import BytesIO

@@ -12,8 +12,6 @@ These rules catch the marks of a scanner that saw nothing: 9999, 32767, 1e30, âˆ
 pockets and bumps that several points show.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -12,8 +12,6 @@
 A number with two readings, such as 1.250 between semicolons, is refused.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re
@@ -112,7 +110,7 @@ class Cells:
     start: int
 
     @classmethod
-    def of(cls, path: Path, mib: float, wanted: Iterable[str], skip: int = 0) -> Cells:
+    def of(cls, path: Path, mib: float, wanted: Iterable[str], skip: int = 0) -> "Cells":
         """Split a file at its header, the first line with the wanted headings, small and without units.
 
         The header is empty if no line has them, or nothing is wanted. Raises InputError.

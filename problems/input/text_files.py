@@ -5,8 +5,6 @@ UTF-32 are refused by name. Where only headings and comments can hold foreign le
 UTF-8 are read as Windows-1252.
 """
 
-from __future__ import annotations
-
 import codecs
 import gzip
 import zlib

@@ -1,7 +1,5 @@
 """Many load cases on one assembly, f and g, made on demand: listed, random gaps, measured gaps, sweeps."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +25,7 @@ class LoadCases(ABC):
     def load(self, k: int) -> LoadCase:
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
 
-    def only(self, numbers: Sequence[int]) -> LoadCases:
+    def only(self, numbers: Sequence[int]) -> "LoadCases":
         """The data of these cases alone, for a worker; the cases keep their numbers."""
         return self
 

@@ -5,8 +5,6 @@ Other whole numbers in the first line, or large ones below a header, are refused
 or parts of decimal numbers. A first column that counts its rows, or whose heading says so, is left out.
 """
 
-from __future__ import annotations
-
 import re
 from itertools import chain, islice
 from math import isnan

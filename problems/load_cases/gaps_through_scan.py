@@ -8,8 +8,6 @@ that grid and ε ~ N(0, (νσ)² I). Conditional on d the field is (Chilès, Del
 Its mean is the scan, continued by kriging; its scatter is νσ at the scan's points and σ far from them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,7 +68,7 @@ class Scan:
     gaps: Vector
 
     @classmethod
-    def of(cls, joint: AnyJoint, points: Matrix, correlation_length: float) -> Scan:
+    def of(cls, joint: AnyJoint, points: Matrix, correlation_length: float) -> "Scan":
         W = joint.grid_weights(points[:, :2], correlation_length)
         grid = joint.grid(correlation_length)
         Lx, Ly = (square_root(lines.tobytes(), correlation_length) for lines in grid)

@@ -1,7 +1,5 @@
 """Load cases with measured gaps: a table with one row per case and one column per contact, mm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -56,7 +54,7 @@ class MeasuredGaps(LoadCases):
     def load(self, k: int) -> LoadCase:
         return LoadCase(self.forces.f, np.array(self._row(k)))
 
-    def only(self, numbers: Sequence[int]) -> MeasuredGaps:
+    def only(self, numbers: Sequence[int]) -> "MeasuredGaps":
         """The table without the rows of other cases."""
         return replace(self, gaps=np.array([self._row(k) for k in numbers]), numbers=tuple(numbers))
 

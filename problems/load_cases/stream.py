@@ -4,8 +4,6 @@ Case 2j has the gap of draw j. Case 2j + 1 has the same gap, and one fastener of
 taken out, or put back if it was out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -44,7 +42,7 @@ class Stream(LoadCases):
     made: dict[int, Vector] = field(default_factory=dict, compare=False)
 
     @classmethod
-    def of(cls, scene: JointScene, gaps: RandomGaps, form: Form) -> Stream:
+    def of(cls, scene: JointScene, gaps: RandomGaps, form: Form) -> "Stream":
         """Raises InputError if the scene has no fasteners."""
         single = tuple(
             effect.model_copy(update={"points": (place,), "pattern": None})

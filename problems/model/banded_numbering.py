@@ -5,8 +5,6 @@ They are numbered line by line across the shorter direction of the mesh, and the
 alternate line by line: K̂_ij ≠ 0 only for unknowns of one line or of neighbouring lines.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,7 +27,7 @@ class Numbering:
     sizes: tuple[int, ...]
 
     @classmethod
-    def of(cls, models: Sequence[PartModel], blocks: Sequence[Sequence[int]]) -> Numbering:
+    def of(cls, models: Sequence[PartModel], blocks: Sequence[Sequence[int]]) -> "Numbering":
         """Number the parts block by block; the unknowns of a block have consecutive numbers."""
         places = [np.full(model.plate.size, -1) for model in models]
         sizes, offset = [], 0

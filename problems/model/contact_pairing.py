@@ -4,8 +4,6 @@ The foot of a node p along its normal n is p + tn, where that line meets the sec
 the axes of the junction's plane; the third coordinate is the height above it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -5,8 +5,6 @@ module is imported only when a scene names it. A table in docs/effects.md says w
 effect that acts on contacts and adds to the gap derives from two: `class Shims(ContactEffect, GapEffect)`.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, ClassVar
@@ -67,7 +65,7 @@ class Effect(Table):
         """
         return np.zeros((0, 2))
 
-    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence["Effect"] = ()) -> Faults:
         """Yield the parameters that do not fit the joint, or contradict other effects of the scene.
 
         Called once a scene's tables are read: it is refused with all faults in one message.

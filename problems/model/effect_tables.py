@@ -1,7 +1,5 @@
 """Reads the [[effect]] tables of a scene, with the CSV files that they name, into effects."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import re
@@ -93,7 +91,7 @@ class EffectTable:
             allowed = "of a measured_gap, a list of what marks a point without a gap, as [9999, 'NaN']"
             yield "missing", missing, allowed
 
-    def faults(self, joint: AnyJoint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
+    def faults(self, joint: AnyJoint, tables: Sequence["EffectTable"]) -> Iterator[Fault]:
         """Yield the faults with respect to the joint and to the effects of the other tables."""
         if self.effect is not None:
             others = [table.effect for table in tables if table.effect is not None and table is not self]

@@ -1,7 +1,5 @@
 """The interface of a joint, of plates or of superelements, to effects, pictures and commands."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -55,7 +53,7 @@ class AnyJoint(Protocol):
     def ids(self) -> tuple[Indices, Indices] | None:
         """The ids of the nodes at which Dx is given, and of the node of each contact; None without ids."""
 
-    def with_contacts(self, pairs: tuple[Pair, ...]) -> AnyJoint:
+    def with_contacts(self, pairs: tuple[Pair, ...]) -> "AnyJoint":
         """The same joint with these contacts."""
 
     def unknowns(self, part: str) -> slice:

@@ -6,8 +6,6 @@ The sparse form is this problem. The dense forms condense it part by part onto t
 at the junction is x, and the multipliers λ are those of min ½xᵀKx − fᵀx, Aᵀx ≤ g.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -46,7 +44,7 @@ class JointModel:
     parts: tuple[PartModel, ...]
 
     @classmethod
-    def of(cls, scene: JointScene) -> JointModel:
+    def of(cls, scene: JointScene) -> "JointModel":
         joint = scene.joint
         assert isinstance(joint, Joint)
         return cls(
@@ -91,7 +89,7 @@ class JointModel:
                 f[joint.unknowns(load.part)] += own
         return LoadCase(f, g)
 
-    def graded(self) -> JointModel:
+    def graded(self) -> "JointModel":
         """A coarser model with the same junction, for a preconditioner."""
         return JointModel(self.scene, self.joint, tuple(map(graded, self.parts)))
 

@@ -1,7 +1,5 @@
 """The table of a superelement's nodes, a CSV: places, normals, and whether each is on the contact surface."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path

@@ -10,8 +10,6 @@ itself on long parts and up to 1e-2 on short strips. A band across the part is h
 grows with its cube falls to an eighth.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -46,7 +44,7 @@ class PartModel:
     geometry: tuple[dict[str, Any], ...] = ()
 
     @classmethod
-    def of(cls, joint: Joint, part: Part, effects: tuple[StiffnessEffect, ...]) -> PartModel:
+    def of(cls, joint: Joint, part: Part, effects: tuple[StiffnessEffect, ...]) -> "PartModel":
         """The model of a part with those of the effects that act on it."""
         plate = joint.plate(part)
         first = part.south.elements if part.south else 0

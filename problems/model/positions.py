@@ -1,7 +1,5 @@
 """The base class of effects at points of the junction, at its nodes or between them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
@@ -33,7 +31,7 @@ class Pattern(Table):
     on_nodes: bool = False
 
     @model_validator(mode="after")
-    def _not_too_many(self) -> Pattern:
+    def _not_too_many(self) -> "Pattern":
         if self.columns * self.rows > MOST:
             raise ValueError(f"must be at most {MOST} points")
         return self
@@ -56,7 +54,7 @@ class Positions(ContactEffect, ForceEffect):
     pattern: Pattern | None = None
 
     @model_validator(mode="after")
-    def _exactly_one(self) -> Positions:
+    def _exactly_one(self) -> "Positions":
         if bool(self.points) == bool(self.pattern):
             raise ValueError("give exactly one of points, file and pattern")
         return self

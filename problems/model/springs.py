@@ -1,7 +1,5 @@
 """Springs between the parts of a joint: K + T diag(k) Tᵀ, and the parts that they join into one block."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +31,7 @@ class Springs:
     parts: tuple[slice, ...]
 
     @classmethod
-    def of(cls, scene: JointScene) -> Springs:
+    def of(cls, scene: JointScene) -> "Springs":
         """The springs of all effects of a scene; there may be none."""
         joint = scene.joint
         found = [effect.springs(joint) for effect in scene.effects_of(SpringEffect)]

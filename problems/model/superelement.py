@@ -7,8 +7,6 @@ which; in other files the order of the rows does (`superelement_rows`).
 A rigid motion of the nodes, r = t + ω × (p − p₀), is free if Kr = 0: only springs to other parts hold it.
 """
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -82,7 +80,7 @@ class Superelement:
     dof: Indices
 
     @classmethod
-    def of(cls, folder: Path, table: SuperelementTable) -> Superelement:
+    def of(cls, folder: Path, table: SuperelementTable) -> "Superelement":
         """Read a part's files. Raises InputError with all faults of them."""
         path, faults, nodes, entry = folder / table.superelement, [], None, None
         try:

@@ -11,8 +11,6 @@ p + tn. With the weights w of b's nodes at the foot, the parts do not overlap if
 The distance t is not part of the gap g, which comes from the effects.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -64,7 +62,7 @@ class SuperelementJoint:
     contacts: tuple[Pair, ...] = ()
 
     @classmethod
-    def of(cls, folder: Path, table: SuperelementJointTable) -> SuperelementJoint:
+    def of(cls, folder: Path, table: SuperelementJointTable) -> "SuperelementJoint":
         """Read the parts. Raises InputError with all faults of all files."""
         parts, faults = [], []
         for part in table.part:
@@ -80,7 +78,7 @@ class SuperelementJoint:
         """The data for a copy in another process, which computes the cached properties anew."""
         return {name: getattr(self, name) for name in ("parts", "distance", "contacts")}
 
-    def with_contacts(self, pairs: tuple[Pair, ...]) -> SuperelementJoint:
+    def with_contacts(self, pairs: tuple[Pair, ...]) -> "SuperelementJoint":
         return replace(self, contacts=pairs)
 
     @property

@@ -7,8 +7,6 @@ They must hold the free rigid motions of the parts, K_i r = 0: with N a basis of
 positive definite.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -47,7 +45,7 @@ class SuperelementModel:
     joint: SuperelementJoint
 
     @classmethod
-    def of(cls, scene: JointScene) -> SuperelementModel:
+    def of(cls, scene: JointScene) -> "SuperelementModel":
         """The model of a scene. Raises InputError if parts are free, or if contacts depend on one another."""
         assert isinstance(scene.joint, SuperelementJoint)
         model = cls(scene, scene.joint)

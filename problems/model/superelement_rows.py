@@ -5,8 +5,6 @@ The rank of such a node is its place among all nodes sorted by their distance fr
 rank over a sample of rows is small if the order is right.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Literal, get_args
 

@@ -11,8 +11,6 @@ a third of its area to both ends of its edge; the last third is shared by all co
 holes are not part of the surface.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
@@ -123,7 +121,7 @@ class Triangles(Surface):
     corner: Indices
 
     @classmethod
-    def of(cls, nodes: Matrix, holes: bool = True) -> Triangles:
+    def of(cls, nodes: Matrix, holes: bool = True) -> "Triangles":
         """The surface of nodes that are SAME or more apart. holes : whether bays and holes stay open."""
         from scipy.spatial import Delaunay, cKDTree
 

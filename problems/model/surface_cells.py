@@ -11,8 +11,6 @@ times the longest edge around it. (A missing node of a mesh gives a ratio of 2, 
 these limits.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -11,8 +11,6 @@ L_ii and L_{i+1,i} are triangular, so that a block takes about 4⅓ b³ operatio
 precision where that suffices for a preconditioner. Off the diagonal only the columns needed are formed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -119,7 +117,7 @@ class BlockPart:
     values: Matrix
 
     @classmethod
-    def of(cls, L: Matrix, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
+    def of(cls, L: Matrix, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> "BlockPart | None":
         """The part from the band factor K = LLᵀ, for the contacts in each window.
 
         None if those of a window are too far apart in the numbering of the band.
