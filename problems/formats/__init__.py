@@ -87,9 +87,7 @@ FORMATS = {
         is_folder=True,
     ),
     "npz": Format("a file .npz, bit for bit", (".npz",), _write_npz, _read_npz),
-    "op4": Format(
-        "a file .op4 (Nastran OUTPUT4, binary), bit for bit", (".op4",), nastran.write_op4, nastran.read_op4
-    ),
+    "op4": Format("a binary file .op4, bit for bit", (".op4",), nastran.write_op4, nastran.read_op4),
 }
 
 

@@ -75,12 +75,10 @@ def validation_faults(
         depth = len(item["loc"])
         if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
             continue  # a consequence of a fault inside it
-        key = ".".join(
-            filter(None, [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD))])
-        )
+        keys = [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD))]
+        key = ".".join(filter(None, keys))
         value = None if item["type"] == "missing" else item["input"]
-        unit = _unit(model, item["loc"])
-        allowed = _allowed(item, model)
+        unit, allowed = _unit(model, item["loc"]), _allowed(item, model)
         yield Fault(str(where), key or "file", value, f"{allowed}; in {unit}" if unit else allowed)
 
 
@@ -104,12 +102,9 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
             return unknown("key", key, [field.alias or name for name, field in fields.items()])
         case "missing":
             return "required"
-        case "too_short" | "too_long" as wrong:
-            limit = item["ctx"]["min_length" if wrong == "too_short" else "max_length"]
-            return f"must have at {'least' if wrong == 'too_short' else 'most'} {limit} entries"
         case "model_type" | "model_attributes_type":
             return "must be a table"
-    return re.sub("^(Input|String) should", "must", item["msg"].removeprefix("Value error, "))
+    return re.sub("^(Input|String|Tuple) should", "must", item["msg"].removeprefix("Value error, "))
 
 
 def _table(model: type[BaseModel], path: Sequence[object]) -> type[BaseModel]:

@@ -83,9 +83,8 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
             parts = {f"{name}_{part}" for name in stems for part in PARTS}
             plain = [name for name in archive.files if name not in parts]
             names = stems + [name for name in plain if name in expected or _kind(archive, name) in NUMBERS]
-            chosen = {
-                name: unpacked(archive, name) if name in stems else archive[name] for name in choose(names)
-            }
+            wanted = choose(names)
+            chosen = {name: unpacked(archive, name) if name in stems else archive[name] for name in wanted}
     for name, M in chosen.items():
         if sp.issparse(M):
             _refuse_damaged(name, M)

@@ -2,7 +2,7 @@
 
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,9 @@ from . import matrix_files
 from .bounded_types import LARGEST
 from .matrix_entries import refuse_no_stiffness
 
+Files = Mapping[str, Path]
+#: (matrix, key, value, what is allowed)
+Faults = Iterable[tuple[str, str, object, str]]
 NAMES = ("K", "A", "f", "g", "nodes")
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
 SMALL = 2000  # unknowns up to which a K is solved in the dense forms
@@ -33,9 +36,7 @@ UNCHANGED = "the file that it was when the scene was read"
 SLIGHT = 1e-6  # of the largest: a coefficient that is rounding
 
 
-def stored_matrices(
-    files: dict[str, Path], files_key: str, sparse: bool
-) -> tuple[Assembly, LoadCase, float, str]:
+def stored_matrices(files: Files, files_key: str, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
     """The assembly and the load case of files, the seconds that reading took, and the key of the assembly.
 
     files_key : `content_key` of the files. sparse : whether K's blocks are sparse, else dense and
@@ -64,12 +65,12 @@ def stored_matrices(
     return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
 
 
-def content_key(files: Mapping[str, Path]) -> str:
+def content_key(files: Files) -> str:
     """The hash of the content of files of matrices."""
     return storage.digest(list(files), *(path.read_bytes() for path in files.values()))
 
 
-def holds_sparse(files: dict[str, Path]) -> bool:
+def holds_sparse(files: Files) -> bool:
     """Whether K is stored as a large sparse matrix; False if the file cannot be read."""
     try:
         if "problem" in files:
@@ -81,7 +82,7 @@ def holds_sparse(files: dict[str, Path]) -> bool:
         return False
 
 
-def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembly, LoadCase]:
+def read_matrices(files: Files, sparse: bool = False) -> tuple[Assembly, LoadCase]:
     """Read and check K, A, f, g.
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
@@ -113,11 +114,9 @@ def checked(
     where : the file or the argument of each matrix. Raises InputError with all faults.
     """
 
-    def refuse(faults: Iterable[tuple[str, str, object, str]]) -> None:
-        """Raise InputError if there are faults: (matrix, key, value, what is allowed)."""
-        found = [Fault(where.get(matrix, "matrices"), *fault) for matrix, *fault in faults]  # type: ignore
-        if found:
-            raise InputError(found)
+    def refuse(faults: Faults) -> None:
+        if wrong := [Fault(where.get(matrix, "matrices"), *fault) for matrix, *fault in faults]:  # type: ignore
+            raise InputError(wrong)
 
     refuse((key, key, None, "is missing") for key in "KAfg" if key not in data)
     refuse(_wrong_kinds(data))
@@ -146,9 +145,6 @@ def checked(
     made = Stiffness.of(*([sp.csc_array(K)] if sparse else dense_blocks(K)), nodes=nodes)
     names = tuple(f"part {k + 1}" for k in range(len(made.blocks)))
     return Assembly(made, A, nodes, names, tuple(notes)), LoadCase(f, g)
-
-
-Faults = Iterator[tuple[str, str, object, str]]
 
 
 def _wrong_kinds(data: Mapping[str, Any]) -> Faults:

@@ -29,9 +29,8 @@ matrices = ManufacturedScene.of
 @cache
 def ladders(prefix: str) -> dict[str, Ladder]:
     """All ladders of a prefix by name."""
-    files = (
-        importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)
-    )
+    names = (f"{__name__}.{module.name}" for module in pkgutil.iter_modules(__path__))
+    files = map(importlib.import_module, names)
     return dict(sorted(pair for file in files for pair in getattr(file, PREFIXES[prefix], {}).items()))
 
 

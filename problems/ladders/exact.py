@@ -26,6 +26,7 @@ from problems.stiffness.operator import Stiffness
 from . import Ladder, Scene, matrices
 from .manufactured import contacts, deferred, exact_assembly, spectrum, two_parts
 
+Units = Vector | float
 KILO, MEGA = 2.0**10, 2.0**20
 
 
@@ -66,7 +67,7 @@ def _coincident(bits: int) -> Scene:
     return matrices(f"Two parts, two nodes tied by {spring:.0e} N/mm", tied)
 
 
-def _in_units(title: str, S: Vector | float = 1.0, C: Vector | float = 1.0, v: float = 1.0) -> Scene:
+def _in_units(title: str, S: Units = 1.0, C: Units = 1.0, v: float = 1.0) -> Scene:
     return matrices(f"Two parts, {title}", rescaled(two_parts(64, 1e6, seed=5), S, C, v))
 
 
@@ -80,19 +81,17 @@ def _random_units(title: str, unknowns: int, contacts: int) -> Scene:
 def _contact_scale(k: int) -> Scene:
     C = np.exp2(np.random.default_rng(9).integers(-k, k + 1, 64))
     title = f"Two parts, each contact in a unit of its own, 2^−{k} to 2^{k} mm"
-    return matrices(title, rescaled(two_parts(64, 1e4, seed=9), 1.0, C, 1.0))
+    return matrices(title, rescaled(two_parts(64, 1e4, seed=9), 1.0, C))
 
 
 def _together(condition: float) -> Scene:
     made = two_parts(64, condition, seed=14, weak=0.25)
     C = np.exp2(np.random.default_rng(15).integers(-5, 6, made.assembly.m))
     title = f"Two parts, cond(K) = {condition:g}, contacts without a force, each in its own unit"
-    return matrices(title, rescaled(made, 1.0, C, 1.0))
+    return matrices(title, rescaled(made, 1.0, C))
 
 
-def rescaled(
-    made: ManufacturedProblem, S: Vector | float, C: Vector | float, v: float
-) -> ManufacturedProblem:
+def rescaled(made: ManufacturedProblem, S: Units, C: Units, v: float = 1.0) -> ManufacturedProblem:
     """The problem in x' = S⁻¹x and λ' = C⁻¹λ/v, with S, C and v powers of two: K' = SKS/v, A' = SAC,
     f' = Sf/v and g' = Cg.
     """

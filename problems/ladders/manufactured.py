@@ -12,6 +12,7 @@ x and λ are the exact solution. Finally everything is scaled by powers of two.
 
 import itertools
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 import scipy.linalg as sla
@@ -24,6 +25,7 @@ from problems.stiffness.operator import Stiffness
 STIFFNESS = 64.0  # N/mm: the smallest eigenvalue of K
 
 Random = np.random.Generator
+Contacts: TypeAlias = sp.csc_array | None  # A
 
 
 def spectrum(n: int, condition: float) -> Vector:
@@ -44,7 +46,7 @@ def contacts(n: int, duplicated: int = 0, tilt: float = 0.0) -> sp.csc_array:
     return A if n & (n - 1) == 0 else sp.csc_array(A[np.r_[:n, 2 * n - 1 : n - 1 : -1]])
 
 
-def exact_assembly(*d: Vector, A: sp.csc_array | None = None) -> Assembly:
+def exact_assembly(*d: Vector, A: Contacts = None) -> Assembly:
     """Parts with the eigenvalues STIFFNESS · d; by default two equal parts, in contact at every node."""
     K = Stiffness.of(*(STIFFNESS * _stiffness(part) for part in d))
     names = tuple(f"part {k + 1}" for k in range(len(d)))
@@ -52,7 +54,7 @@ def exact_assembly(*d: Vector, A: sp.csc_array | None = None) -> Assembly:
 
 
 def manufacture(
-    *d: Vector, seed: int, A: sp.csc_array | None = None, closed: float = 0.4, weak: float = 0.0
+    *d: Vector, seed: int, A: Contacts = None, closed: float = 0.4, weak: float = 0.0
 ) -> ManufacturedProblem:
     """`exact_assembly` with a prescribed solution: similar forces in all modes, gaps up to about 0.5 mm.
 
@@ -69,7 +71,7 @@ def manufacture(
 
 
 def two_parts(
-    n: int, condition: float, seed: int, A: sp.csc_array | None = None, **shares: float
+    n: int, condition: float, seed: int, A: Contacts = None, **shares: float
 ) -> ManufacturedProblem:
     """`manufacture` of two parts of n unknowns with the same spectrum."""
     d = spectrum(n, condition)
@@ -77,20 +79,12 @@ def two_parts(
 
 
 def deferred(
-    title: str,
-    n: int,
-    condition: float,
-    seed: int,
-    A: sp.csc_array | None = None,
-    refused: str = "",
-    **shares: float,
+    title: str, n: int, condition: float, seed: int, A: Contacts = None, refused: str = "", **shares: float
 ) -> ManufacturedScene:
     """The rung of `two_parts` with n unknowns together, made when needed."""
     size = n // 2
-    make = partial(two_parts, size, condition, seed, A, **shares)
-    return ManufacturedScene(
-        "", title, make, (size, size), size if A is None else A.shape[1], refused=refused
-    )
+    make, m = partial(two_parts, size, condition, seed, A, **shares), size if A is None else A.shape[1]
+    return ManufacturedScene("", title, make, (size, size), m, refused=refused)
 
 
 def _stiffness(d: Vector) -> Matrix:

@@ -52,14 +52,15 @@ from problems.stiffness.operator import Stiffness
 
 from . import Ladder, Scene
 
+Make = Callable[[], ManufacturedProblem]
 CELLS = (20, 40, 80, 160, 320)
 COUPLE = 5.0  # c: twice the angle of twist per length, in units of the yield stress
 COPS = "COPS 3.0, torsion, nx = ny = 50 (as MadNLP/COPSBenchmark.jl quotes it)"
-#: Nodes a side, edges included, and the optimum that CUTEst prints.
-OBSTCLAE = {4: 0.753659753, 10: 1.397897560, 23: 1.678027027, 32: 1.748270031}
-TORSION1 = {4: -5.1851852e-1, 10: -4.9234185e-1, 22: -4.5608771e-1}
+#: Nodes a side, edges included, and the optimum that CUTEst prints; its digits.
+OBSTCLAE = {4: 0.753659753, 10: 1.397897560, 23: 1.678027027, 32: 1.748270031}, 9
+TORSION1 = {4: -5.1851852e-1, 10: -4.9234185e-1, 22: -4.5608771e-1}, 8
+JNLBRNG1 = {10: -0.17896, 23: -0.18005, 32: -0.1803, 75: -0.18055, 100: -0.18057, 125: -0.18058}, 5
 HALF_WIDTH = 10.0  # b
-JNLBRNG1 = {10: -0.1789600, 23: -0.1800500, 32: -0.1803000, 75: -0.1805500, 100: -0.1805700, 125: -0.1805800}
 PETSC = {  # inner nodes in x and y, ε, optimum, its digits
     "8x12": (8, 12, 0.1, PrintedOptimum(-0.183437, 6, "PETSc/TAO, jbearing2_1.out")),
     "10x16": (10, 16, 0.9, PrintedOptimum(-15.607, 5, "PETSc/TAO, jbearing2_3.out")),
@@ -102,12 +103,8 @@ def bounded(
 
 
 def membrane(
-    title: str,
-    size: int,
-    make: Callable[[], ManufacturedProblem],
-    m: int | None = None,
-    printed: PrintedOptimum | None = None,
-) -> ManufacturedScene:
+    title: str, size: int, make: Make, m: int | None = None, printed: PrintedOptimum | None = None
+) -> Scene:
     """A rung of `size` unknowns with m contacts, by default one at each unknown, made when needed."""
     return ManufacturedScene("", title, make, (size,), m or size, sparse=True, printed=printed)
 
@@ -120,7 +117,7 @@ def _unit_square(
     cells: int,
     edge: float = 1.0,
     printed: PrintedOptimum | None = None,
-) -> ManufacturedScene:
+) -> Scene:
     """A rung on the unit square: `load` per area, and ±u ≤ ±`bound` at the nodes of the inner lines."""
     size, h = cells - 1, 1 / cells
 
@@ -193,6 +190,12 @@ def _bearing(nx: int, ny: int, eccentricity: float = 0.1, printed: PrintedOptimu
     return membrane(title, nx * ny, partial(journal_bearing, nx, ny, eccentricity), printed=printed)
 
 
+def _cutest(name: str, rung: Callable[..., Scene], optima: dict[int, float], digits: int) -> Ladder:
+    """The rungs of a problem of CUTEst. rung : makes one of nodes a side and its optimum."""
+    printed = {k: PrintedOptimum(value, digits, f"CUTEst, {name}.SIF") for k, value in optima.items()}
+    return {f"cutest-{k}": partial(rung, k, optimum) for k, optimum in printed.items()}
+
+
 _obstacle = partial(_unit_square, "A membrane on an obstacle", 1.0, -1.0, _sines)
 _torsion = partial(_unit_square, "Elastic–plastic torsion", COUPLE, 1.0, _distance)
 
@@ -200,31 +203,16 @@ OUTSIDE: dict[str, Ladder] = {
     "hemisphere": {f"{cells}": partial(_hemisphere, cells) for cells in (8, *CELLS)},
     "journal_bearing": {
         **{f"{cells}": partial(_bearing, cells - 1, cells - 1) for cells in CELLS},
-        **{
-            f"cutest-{side}": partial(
-                _bearing, side - 2, side - 2, printed=PrintedOptimum(value, 5, "CUTEst, JNLBRNG1.SIF")
-            )
-            for side, value in JNLBRNG1.items()
-        },
+        **_cutest("JNLBRNG1", lambda k, optimum: _bearing(k - 2, k - 2, printed=optimum), *JNLBRNG1),
         **{f"petsc-{name}": partial(_bearing, *given) for name, given in PETSC.items()},
     },
     "obstacle": {
         **{f"{cells}": partial(_obstacle, cells) for cells in CELLS},
-        **{
-            f"cutest-{side}": partial(
-                _obstacle, side - 1, 0.5, PrintedOptimum(value, 9, "CUTEst, OBSTCLAE.SIF")
-            )
-            for side, value in OBSTCLAE.items()
-        },
+        **_cutest("OBSTCLAE", lambda k, optimum: _obstacle(k - 1, 0.5, optimum), *OBSTCLAE),
     },
     "torsion": {
         **{f"{cells}": partial(_torsion, cells) for cells in CELLS},
         "cops-50x50": partial(_torsion, 51, printed=PrintedOptimum(-4.18087e-1, 6, COPS)),
-        **{
-            f"cutest-{side}": partial(
-                _torsion, side - 1, 0.5, PrintedOptimum(value, 8, "CUTEst, TORSION1.SIF")
-            )
-            for side, value in TORSION1.items()
-        },
+        **_cutest("TORSION1", lambda k, optimum: _torsion(k - 1, 0.5, optimum), *TORSION1),
     },
 }

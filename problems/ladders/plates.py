@@ -73,8 +73,7 @@ def _on_springs(stiffness: float) -> Scene:
 
 
 def _panel_on_springs(n: int, stiffness: float) -> Scene:
-    title = f"A wing panel on supports of {stiffness:g} N/mm"
-    return wing_panel(title, n, stiffness_per_point=stiffness)
+    return wing_panel(f"A wing panel on supports of {stiffness:g} N/mm", n, stiffness_per_point=stiffness)
 
 
 def _thicker(times: int) -> Scene:

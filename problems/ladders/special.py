@@ -36,6 +36,7 @@ from . import Ladder, Scene, matrices
 from .manufactured import exact_assembly, manufacture, spectrum, two_parts
 from .plates import CLAMPED, FREE, Tables, plates
 
+SIZES = (8, 16, 32, 48, 64, 128, 256, 512)  # contacts of Fathi's problem; the first four of Murty's
 GRID = 2.0**24  # the chain's gaps are multiples of 1/GRID
 
 
@@ -137,7 +138,8 @@ def _many_contacts() -> Scene:
 
 
 INDEFINITE = "K must be positive definite"
-TOOL = ("part 1", "tool")
+TOOL, ON_TOOL = ("part 1", "tool"), ("floating", "tool")
+LOOSE = {"floating": FREE}
 BETWEEN = (("part 1", "part 2"), ("part 2", "tool"))
 STIFF = _stack(1) | {"part 2": CLAMPED | {"young": 70e6}}
 
@@ -145,14 +147,8 @@ _floating = partial(plates, refused=INDEFINITE)
 
 RUNGS: dict[str, Ladder] = {
     "pivoting": {
-        **{
-            f"fathi-{m:03d}": partial(_triangular, "Fathi", np.ones(m))
-            for m in (8, 16, 32, 48, 64, 128, 256, 512)
-        },
-        **{
-            f"murty-{m:02d}": partial(_triangular, "Murty", 2.0 - np.exp2(-np.arange(m)))
-            for m in (8, 16, 32, 48)
-        },
+        **{f"fathi-{m:03d}": partial(_triangular, "Fathi", np.ones(m)) for m in SIZES},
+        **{f"murty-{m:02d}": partial(_triangular, "Murty", 2 - np.exp2(-np.arange(m))) for m in SIZES[:4]},
         **{f"chain-{m:02d}": partial(_chain, m) for m in (8, 16, 24, 32)},
         **{f"vertex-{n:03d}": partial(_vertex, n) for n in (16, 64, 256)},
     },
@@ -182,15 +178,8 @@ RUNGS: dict[str, Ladder] = {
         "more-contacts-than-unknowns": _many_contacts,
     },
     "floating": {
-        "on-a-part": partial(
-            _floating, "A free plate against a clamped one", {"clamped": CLAMPED, "floating": FREE}
-        ),
-        "on-a-tool": partial(
-            _floating,
-            "A free plate against a rigid tool",
-            {"floating": FREE},
-            contacts=(("floating", "tool"),),
-        ),
+        "on-a-part": partial(_floating, "A free plate against a clamped one", {"clamped": CLAMPED} | LOOSE),
+        "on-a-tool": partial(_floating, "A free plate against a rigid tool", LOOSE, contacts=(ON_TOOL,)),
         "matrix": _singular,
     },
 }

@@ -23,7 +23,6 @@ from . import LoadCases
 from .gap_tables import read_gaps
 
 MAX_NOTES = 10  # on unusual gaps; further ones are counted
-ROWS_AT_A_TIME = 256
 TABLE_MIB = 2**15
 
 
@@ -81,9 +80,8 @@ def measured_gaps(
     m = len(forces.g)
     gaps = _read(regular_file(path, "file", TABLE_MIB), m, options)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
-        raise InputError.one(
-            path, "shape", gaps.shape, f"one row per case, one column for each of {m} contacts"
-        )
+        allowed = f"one row per case, one column for each of {m} contacts"
+        raise InputError.one(path, "shape", gaps.shape, allowed)
     if count is not None and count > len(gaps):
         raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
     notes = []
@@ -128,15 +126,12 @@ def _unusual(scene: Scene, path: Path, gaps: Matrix) -> Iterator[str]:
 
 def _refuse_infinite(path: Path, gaps: Matrix) -> None:
     """Raises InputError with the first gap that is not finite, and the number of cases that have one."""
-    cases: list[int] = []
-    for start in range(0, len(gaps), ROWS_AT_A_TIME):
-        finite = np.isfinite(gaps[start : start + ROWS_AT_A_TIME]).all(axis=1)
-        cases += (start + np.flatnonzero(~finite)).tolist()
-    if cases:
-        contact = int(np.argmin(np.isfinite(gaps[cases[0]])))
-        more = f"; {len(cases) - 1} more cases have such gaps" if len(cases) > 1 else ""
-        where, value = f"case {cases[0]}, contact {contact}", float(gaps[cases[0], contact])
-        raise InputError.one(path, where, value, f"every gap must be a finite number, in mm{more}")
+    case, contact = np.nonzero(~np.isfinite(gaps))
+    if len(case):
+        cases, value = len(set(case.tolist())), float(gaps[case[0], contact[0]])
+        more = f"; {cases - 1} more cases have such gaps" if cases > 1 else ""
+        allowed = f"every gap must be a finite number, in mm{more}"
+        raise InputError.one(path, f"case {case[0]}, contact {contact[0]}", value, allowed)
 
 
 def _read(path: Path, m: int, options: TableOptions) -> Matrix:

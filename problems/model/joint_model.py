@@ -47,9 +47,8 @@ class JointModel:
     def of(cls, scene: JointScene) -> "JointModel":
         joint = scene.joint
         assert isinstance(joint, Joint)
-        return cls(
-            scene, joint, tuple(PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part)
-        )
+        parts = (PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part)
+        return cls(scene, joint, tuple(parts))
 
     def sparse(self) -> SparsePrepared:
         """K̂ and B. Raises InputError, where factors are first needed, if K̂ is not positive definite."""
@@ -65,10 +64,10 @@ class JointModel:
         """Whether every dense matrix is in the cache; computes nothing."""
         from .condensation import part_key  # of the dense forms only
 
-        known = [*map(part_key, self.parts)]
+        keys = [*map(part_key, self.parts)]
         if self.springs:
-            known.append(self.springs.key(storage.digest(known)))
-        return None not in map(storage.load, known) and self.dense().built
+            keys.append(self.springs.key(storage.digest(keys)))
+        return None not in map(storage.load, keys) and self.dense().built
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
@@ -151,11 +150,10 @@ class JointModel:
     def _at_junction(self, M: sp.sparray) -> sp.csc_array:
         """(N, k): the rows of M (n, k) at the junction's deflections, the others zero."""
         M = sp.csc_array(M)
-        K_block = sp.csc_array(
-            (M.data.copy(), self.junction[M.indices], M.indptr), shape=(self.numbering.size, M.shape[1])
-        )
-        K_block.sort_indices()
-        return K_block
+        entries = M.data.copy(), self.junction[M.indices], M.indptr
+        rows = sp.csc_array(entries, shape=(self.numbering.size, M.shape[1]))
+        rows.sort_indices()
+        return rows
 
     def _nodes(self) -> np.ndarray:
         """(N, 2) the coordinates of each unknown's node, mm."""

@@ -100,10 +100,8 @@ class Superelement:
         part = cls(table.name, path, key, source, dofs, nodes, node, dof)
         if (lost := part._lost).size:
             where = f"{len(lost)} nodes of the contact surface, ids {listed(map(str, nodes.ids[lost]))}"
-            kept = (
-                "K must keep the displacement along the normal of each contact node; contact = 0 excepts one"
-            )
-            raise InputError.one(folder / table.nodes, "nodes", where, kept)
+            allowed = "K must keep the displacement along the normal of each; contact = 0 excepts a node"
+            raise InputError.one(folder / table.nodes, "nodes", where, allowed)
         return part
 
     @property
@@ -123,6 +121,7 @@ class Superelement:
 
     @property
     def notes(self) -> list[str]:
+        """Sentences on what reading K has changed or left out."""
         return [f"{self.name}: {note}" for note in stored(self.file, *self.source)[1]["notes"]]
 
     @property

@@ -68,11 +68,7 @@ class Grid(Surface):
         corners = iy * nx + ix + np.array([[0], [1], [nx], [nx + 1]])
         shares = np.stack([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t])
         columns = corners.ravel() if self.place is None else self.place[corners.ravel()]
-        W = sp.csr_array(
-            sp.coo_array((shares.ravel(), (np.tile(np.arange(k), 4), columns)), shape=(k, nodes))
-        )
-        W.eliminate_zeros()
-        return W
+        return _weights(shares.ravel(), np.tile(np.arange(k), 4), columns, (k, nodes))
 
     def covers(self, points: Matrix) -> Mask:
         points = self._turned(points)
@@ -131,9 +127,8 @@ class Triangles(Surface):
         mesh = Delaunay(nodes)
         cell, solid, bridge = cells_of(nodes, mesh.simplices, mesh.neighbors)
         kept = solid & ~(bridge & holes)
-        of, corner = np.unique(
-            np.column_stack([np.repeat(cell[kept], 3), mesh.simplices[kept].ravel()]), axis=0
-        ).T
+        corners = np.column_stack([np.repeat(cell[kept], 3), mesh.simplices[kept].ravel()])
+        of, corner = np.unique(corners, axis=0).T
         start = np.searchsorted(of, np.arange(cell.max() + 2))
         about = nodes[corner] - means(of, nodes[corner])[of]
         corner = corner[np.lexsort((np.arctan2(about[:, 1], about[:, 0]), of))]
@@ -160,10 +155,8 @@ class Triangles(Surface):
             rows.append(np.repeat(group, n))
             columns.append(corners.ravel())
             values.append(wachspress(self.nodes[corners], points[group]).ravel())
-        places = np.concatenate(rows), self.order[np.concatenate(columns)]
-        W = sp.csr_array(sp.coo_array((np.concatenate(values), places), shape=(len(points), len(self.nodes))))
-        W.eliminate_zeros()
-        return W
+        row, column, value = map(np.concatenate, (rows, columns, values))
+        return _weights(value, row, self.order[column], (len(points), len(self.nodes)))
 
     def covers(self, points: Matrix) -> Mask:
         points = points - self.middle
@@ -191,9 +184,8 @@ class Triangles(Surface):
         best = np.full(len(points), len(self.cell))
         for triangle in np.column_stack([owner, self.mesh.neighbors[owner]]).T:
             inside = np.flatnonzero((owner >= 0) & (triangle >= 0) & self.kept[triangle] & (triangle < best))
-            a, b, c = (
-                self.nodes[self.mesh.simplices[triangle[inside], j]] - points[inside] for j in range(3)
-            )
+            corners = self.mesh.simplices[triangle[inside]]
+            a, b, c = (self.nodes[corners[:, j]] - points[inside] for j in range(3))
             shares = np.column_stack([cross(b, c), cross(c, a), cross(a, b)])
             shares = shares / shares.sum(axis=1, keepdims=True)
             on = inside[(shares >= -ROUNDING).all(axis=1)]
@@ -219,6 +211,12 @@ def surface_of(nodes: Matrix) -> Surface:
             number[place] = np.arange(len(place))
             return Grid(x, y, number, SAME, turn)
     return Triangles.of(nodes)
+
+
+def _weights(values: Vector, rows: Indices, columns: Indices, shape: tuple[int, int]) -> sp.csr_array:
+    W = sp.csr_array(sp.coo_array((values, (rows, columns)), shape=shape))
+    W.eliminate_zeros()
+    return W
 
 
 def _shortest_edge(nodes: Matrix) -> Vector:

@@ -43,9 +43,8 @@ def cells_of(nodes: Matrix, triangles: Indices, beside: Indices) -> tuple[Indice
     blunt = angle >= np.pi / 2 - ROUNDING
     fat = angle.min(axis=1) > SLIVER
     alike = inside & fat[:, None] & fat[beside] & (abs(angle + across - np.pi) <= ROUNDING)
-    cell, pocket = (
-        _joined(here[links], beside[links], len(here)) for links in (alike, alike | inside & blunt)
-    )
+    masks = alike, alike | inside & blunt
+    cell, pocket = (_joined(here[links], beside[links], len(here)) for links in masks)
 
     near = solid[:, None] & (~inside | ~blunt & (across < np.pi / 2 - ROUNDING))
     usual = _medians(np.concatenate([first[near], second[near]]), np.tile(edge[near], 2), len(nodes))
