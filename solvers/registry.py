@@ -5,8 +5,6 @@ It defines one subclass of Solver; its file name, with - for _, is the solver's 
 qpsolvers have their name there, and a plug-in (plugin.py) has the name of its file.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 import inspect

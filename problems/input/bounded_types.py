@@ -104,7 +104,8 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
             return "required"
         case "model_type" | "model_attributes_type":
             return "must be a table"
-    return re.sub("^(Input|String|Tuple) should", "must", item["msg"].removeprefix("Value error, "))
+    message = item["msg"].removeprefix("Value error, ").replace(" after validation", "")
+    return re.sub("^(Input|String|Tuple) should", "must", message)
 
 
 def _table(model: type[BaseModel], path: Sequence[object]) -> type[BaseModel]:

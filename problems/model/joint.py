@@ -12,7 +12,7 @@ y = −south.length          └──────────────┘
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -81,6 +81,9 @@ class Part(Table):
 class Joint(Table):
     """Junction, parts and contacts. A contact (a, b) means x_a − x_b ≤ g at every junction node."""
 
+    shortest: ClassVar[float] = 0.0
+    shown: ClassVar[None] = None
+    ids: ClassVar[None] = None
     junction: Junction
     part: Annotated[tuple[Part, ...], Field(min_length=1, max_length=100)]
     contacts: tuple[Pair, ...] = ()
@@ -132,18 +135,6 @@ class Joint(Table):
     @property
     def thinnest(self) -> float:
         return min(part.thickness for part in self.part)
-
-    @property
-    def shortest(self) -> float:
-        return 0.0
-
-    @property
-    def shown(self) -> None:
-        return None
-
-    @property
-    def ids(self) -> None:
-        return None
 
     @property
     def surface(self) -> Grid:

@@ -8,7 +8,7 @@ at the junction is x, and the multipliers λ are those of min ½xᵀKx − fᵀx
 
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -37,11 +37,12 @@ WORTH = 0.5  # of `work`: a coarser model that needs more is not used
 
 @dataclass(frozen=True)
 class JointModel:
-    """The parts of a scene as finite elements."""
+    """The parts of a scene as finite elements. interiors : see `interior`, made when first needed."""
 
     scene: JointScene
     joint: Joint
     parts: tuple[PartModel, ...]
+    interiors: dict[int, tuple[Indices, SparseBlock]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, scene: JointScene) -> "JointModel":
@@ -101,14 +102,9 @@ class JointModel:
     def springs(self) -> Springs:
         return Springs.of(self.scene)
 
-    @property
-    def tied(self) -> list[list[int]]:
-        """The parts of each block of K̂: parts that springs join are one block."""
-        return self.springs.tied
-
     @cached_property
     def numbering(self) -> Numbering:
-        return Numbering.of(self.parts, self.tied)
+        return Numbering.of(self.parts, self.springs.tied)
 
     @cached_property
     def junction(self) -> Indices:
@@ -121,11 +117,11 @@ class JointModel:
         blocks = []
         added = self._at_junction(self._at_junction(self.springs.added).T)
         ends = np.cumsum([0, *self.numbering.sizes])
-        for parts, start, stop in zip(self.tied, ends[:-1], ends[1:], strict=True):
+        for parts, start, stop in zip(self.springs.tied, ends[:-1], ends[1:], strict=True):
             K = self._block(parts, int(start), int(stop - start))
             blocks.append(sp.csc_array(K + added[start:stop, start:stop] if self.springs else K))
         B, nodes = self._at_junction(self.joint.contact_matrix()), self._nodes()
-        names = self._names(self.tied)
+        names = self._names(self.springs.tied)
         return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, names, junction=self.junction)
 
     def _names(self, blocks: Iterable[Iterable[int]]) -> tuple[str, ...]:
@@ -166,15 +162,11 @@ class JointModel:
 
     def interior(self, k: int) -> tuple[Indices, SparseBlock]:
         """The unknowns i of a part that condensation eliminates, ordered for a narrow band, and K_ii."""
-        if k not in self._interiors:
+        if k not in self.interiors:
             part = self.parts[k]
             i = part.others[np.argsort(self.numbering.places[k][part.others])]
-            self._interiors[k] = i, sparse_block(sp.csc_array(part.stiffness()[i][:, i]))
-        return self._interiors[k]
-
-    @cached_property
-    def _interiors(self) -> dict[int, tuple[Indices, SparseBlock]]:
-        return {}
+            self.interiors[k] = i, sparse_block(sp.csc_array(part.stiffness()[i][:, i]))
+        return self.interiors[k]
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K and A, from the cache or computed now; a dense block of K for each part, or for a range of parts

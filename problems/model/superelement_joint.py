@@ -15,7 +15,7 @@ import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -57,6 +57,7 @@ class SuperelementJointTable(Table):
 class SuperelementJoint:
     """A joint of superelements; x are the kept unknowns of all parts, part after part. See `AnyJoint`."""
 
+    thinnest: ClassVar[float] = np.inf
     parts: tuple[Superelement, ...]
     distance: float
     contacts: tuple[Pair, ...] = ()
@@ -101,8 +102,7 @@ class SuperelementJoint:
     @cached_property
     def axes(self) -> Matrix:
         """(3, 3) the directions of x, y and the normal of the plane, row by row."""
-        first = self.parts[0]
-        normal = first.nodes.normal[first.contacts].sum(axis=0)
+        normal = self._normals[self.names[0]].sum(axis=0)
         normal /= np.linalg.norm(normal) or 1.0
         if normal[2] >= LEVEL:
             return np.eye(3)
@@ -125,8 +125,8 @@ class SuperelementJoint:
         """The face of each part in the axes of the plane. Raises ValueError if its nodes are on one line."""
         faces = {}
         for part in self.parts:
-            xyz, normals = (each[part.contacts] @ self.axes.T for each in (part.nodes.xyz, part.nodes.normal))
-            faces[part.name] = Face(xyz, normals, surface_of(xyz[:, :2]))
+            xyz = part.nodes.xyz[part.contacts] @ self.axes.T
+            faces[part.name] = Face(xyz, self._normals[part.name] @ self.axes.T, surface_of(xyz[:, :2]))
         return faces
 
     @cached_property
@@ -194,26 +194,18 @@ class SuperelementJoint:
         return np.array([every.min(axis=0), every.max(axis=0)])
 
     @property
-    def thinnest(self) -> float:
-        return np.inf
-
-    @property
     def shortest(self) -> float:
         return PER_LENGTH * float(np.diff(self.bounds, axis=0).max()) / MOST
 
     def unknowns(self, part: str) -> slice:
-        index = self.names.index(part)
-        start = sum(each.size for each in self.parts[:index])
-        return slice(start, start + self.parts[index].size)
+        return _slice([each.size for each in self.parts], self.names.index(part))
 
     def span(self, pair: Pair) -> slice:
-        index = self.pairs.index(pair)
-        start = sum(len(self.places(each)) for each in self.pairs[:index])
-        return slice(start, start + len(self.places(pair)))
+        return _slice([len(self.places(each)) for each in self.pairs], self.pairs.index(pair))
 
     @property
     def ids(self) -> tuple[Indices, Indices]:
-        contacts = [self._of[a].contact_ids[self.pairings[a, b].nodes] for a, b in self.pairs]
+        contacts = (self._of[a].contact_ids[self.pairings[a, b].nodes] for a, b in self.pairs)
         nodes = np.concatenate([part.contact_ids for part in self.parts])
         return nodes, np.concatenate([np.zeros(0, np.intp), *contacts])
 
@@ -236,11 +228,11 @@ class SuperelementJoint:
 
     def _along(self, part: str, W: sp.csr_array, normals: Matrix) -> sp.csr_array:
         """(k, unknowns of the part) of Σ_j w_ij n_i·u_j. W (k, contact nodes) : w. normals (k, 3) : n."""
-        own = self._of[part]
-        terms = [sp.diags_array(normals[:, d]) @ W @ own.displacements(d) for d in range(3)]
-        found = sp.csr_array(terms[0] + terms[1] + terms[2])
-        found.eliminate_zeros()
-        return found
+        moves = map(self._of[part].displacements, range(3))
+        terms = (sp.diags_array(n) @ W @ move for n, move in zip(normals.T, moves, strict=True))
+        W_n = sp.csr_array(sum(terms))
+        W_n.eliminate_zeros()
+        return W_n
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
         normals = self.faces[along or part].surface.weights(points) @ self._normals[along or part]
@@ -293,16 +285,20 @@ class SuperelementJoint:
         return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist(), ()
 
     def contact_matrix(self) -> sp.csc_array:
-        columns = []
-        for pair, pairing in self.pairings.items():
-            normals = self._normals[pair[0]][pairing.nodes]
-            own = sp.eye_array(len(self.faces[pair[0]].xyz), format="csr")[pairing.nodes]
-            rows = {pair[0]: self._along(pair[0], own, normals)}
-            if pair[1] != TOOL:
-                rows[pair[1]] = -self._along(pair[1], pairing.W, normals)
+        columns = [sp.csr_array((0, self.size[0]))]
+        for (a, b), pairing in self.pairings.items():
+            normals = self._normals[a][pairing.nodes]
+            one = sp.eye_array(len(self.faces[a].xyz), format="csr")[pairing.nodes]
+            rows = {a: self._along(a, one, normals)}
+            if b != TOOL:
+                rows[b] = -self._along(b, pairing.W, normals)
             columns.append(across(self, rows, len(pairing.nodes)))
-        if not columns:
-            return sp.csc_array((self.size[0], 0))
         A = sp.csc_array(sp.vstack(columns).T)
         A.sort_indices()
         return A
+
+
+def _slice(sizes: list[int], index: int) -> slice:
+    """The numbers of one of consecutive groups of these sizes."""
+    start = sum(sizes[:index])
+    return slice(start, start + sizes[index])

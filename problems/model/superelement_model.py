@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from problems import storage
 from problems.errors import Fault, InputError
 from problems.formats import DENSEST
-from problems.forms.assembly import Assembly, LoadCase, Matrix
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.input.user_matrices import SMALL, refuse_dependent
 from problems.reporter import SILENT, Reporter
@@ -86,7 +86,8 @@ class SuperelementModel:
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         start = time.perf_counter()
-        blocks = [_dense(part.stiffness) for part in self.joint.parts]
+        matrices = [part.stiffness for part in self.joint.parts]
+        blocks = [K.toarray(order="F") if sp.issparse(K) else K for K in matrices]
         before = {"condensation": time.perf_counter() - start}
         if self.springs:
             blocks, before["ties"] = self.springs.blocks(self._key, blocks, reporter)
@@ -133,7 +134,3 @@ class SuperelementModel:
                 faults.append(Fault(str(part.file), f"part.{part.name}", motion, MUST_BE_HELD))
         if faults:
             raise InputError(faults)
-
-
-def _dense(K: Any) -> Matrix:
-    return K.toarray(order="F") if sp.issparse(K) else K

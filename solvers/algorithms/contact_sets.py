@@ -22,8 +22,6 @@ Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; the next product with
 In both ways, ever stiffer springs find a first set.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

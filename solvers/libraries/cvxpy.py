@@ -6,8 +6,6 @@ again. The tolerance is passed on as OSQP's `eps_abs` or as Clarabel's three, wi
 is left at CVXPY's defaults, as a user would have it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -5,8 +5,6 @@ gradient max|λ − max(λ − y, 0)| ≤ tolerance, in which a force in N stand
 when the objective no longer changes in its last digit, which it also calls a success: "inaccurate".
 """
 
-from __future__ import annotations
-
 from scipy.optimize import minimize
 
 from problems.forms.assembly import Vector

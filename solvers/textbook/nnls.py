@@ -4,8 +4,6 @@ C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23:
 closes one contact at a time. It takes no tolerance.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import scipy.linalg as sla

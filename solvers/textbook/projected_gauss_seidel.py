@@ -8,8 +8,6 @@ One contact after another,
 which converges for 0 < ω < 2, by a factor of about 1 − 1/cond(Q) per sweep: a few digits soon, many never.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -9,8 +9,6 @@ without forces, p > 0, it repeats
 until no sign is wrong. It is a semismooth Newton method: a few steps as a rule, without a proof that it ends.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as sla
 

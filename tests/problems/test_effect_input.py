@@ -50,7 +50,7 @@ ALONE = [
     ('kind = "installed_fasteners"\npoints = [[1, 1]]\nbetween = ["a", "c"]', "between", "['a', 'b']"),
     ('kind = "initial_gap"\nmean = 1\nbetween = ["b", "a"]', "between", "['a', 'b']"),
     ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 9, 1], [18, 18, 1]]', "points", "off a line"),
-    ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 9, 1]]', "points", "at least 3 entries"),
+    ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 9, 1]]', "points", "at least 3 items"),
     ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 0, 1], [9, 9, 2], [9, 0, 3]]', "points[1]", "twice"),
     (
         'kind = "local_thickness"\npart = "a"\nthickness = 1\nx = [0, 101]\ny = [0, 9]',
