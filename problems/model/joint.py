@@ -193,19 +193,7 @@ class Joint(Table):
 
     def contact_matrix(self) -> sp.csc_array:
         """A, (n, m): +1 for the first part of a pair, −1 for the second unless that is the tool."""
-        n, m = self.size
-        if m == 0:
-            return sp.csc_array((n, 0))
-        nodes = np.arange(self.node_count)
-        rows, columns, signs = [], [], []
-        for k, pair in enumerate(self.pairs):
-            for part, sign in zip(pair, (1.0, -1.0), strict=True):
-                if part != TOOL:
-                    rows.append(self.unknowns(part).start + nodes)
-                    columns.append(k * self.node_count + nodes)
-                    signs.append(np.full(self.node_count, sign))
-        entries = (np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns)))
-        A = sp.csc_array(sp.coo_array(entries, shape=(n, m)))
+        A = sp.csc_array(sp.kron(signs(self.names, self.pairs).T, sp.eye_array(self.node_count)))
         A.sort_indices()
         return A
 
@@ -245,6 +233,12 @@ class Joint(Table):
                 yield f"part.{part.name}.young", part.young, metals
 
 
+def signs(names: Sequence[str], pairs: Sequence[Pair]) -> Matrix:
+    """(pairs, parts): +1 for the first part of a pair, −1 for the second, 0 for the others."""
+    rows = [[float(name == a) - (name == b) for name in names] for a, b in pairs]
+    return np.array(rows).reshape(len(pairs), len(names))
+
+
 def wrong_contacts(
     names: Sequence[str], contacts: Sequence[Pair], pairs: Sequence[Pair], at_one_place: bool = True
 ) -> Faults:
@@ -260,7 +254,7 @@ def wrong_contacts(
     for pair in contacts:
         if pair[0] not in parts or pair[1] not in (*parts, TOOL) or pair[0] == pair[1]:
             yield "contacts", list(pair), f'two different parts of {parts}; the second may be "{TOOL}"'
-    sides = np.array([[(name == a) - (name == b) for name in parts] for a, b in pairs])
+    sides = signs(parts, pairs)
     if len(np.unique(abs(sides), axis=0)) < len(pairs):
         yield "contacts", [list(pair) for pair in pairs], "no pair twice"
     elif at_one_place and pairs and np.linalg.matrix_rank(sides) < len(pairs):

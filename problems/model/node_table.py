@@ -44,10 +44,9 @@ def read_nodes(path: Path) -> Nodes:
         raise InputError(read.faults)
     values = dict(zip(read.columns, np.array(read.rows).T, strict=True))
     ids, xyz = values["id"], np.column_stack([values[name] for name in "xyz"])
-    normal = np.zeros((len(ids), 3))
-    normal[:, 2] = not values.keys() & {*NORMAL}
-    for k, name in enumerate(NORMAL):
-        normal[:, k] = values.get(name, normal[:, k])
+    default = 0.0, 0.0, float(not values.keys() & {*NORMAL})
+    columns = [values.get(name, np.full(len(ids), one)) for name, one in zip(NORMAL, default, strict=True)]
+    normal = np.column_stack(columns)
     contact, length = values.get("contact", np.ones(len(ids))), np.linalg.norm(normal, axis=1)
     if faults := list(_wrong_nodes(ids, xyz, length, contact)):
         raise InputError([Fault(str(path), *fault) for fault in faults])

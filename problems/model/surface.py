@@ -11,7 +11,6 @@ a third of its area to both ends of its edge; the last third is shared by all co
 holes are not part of the surface.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,27 +26,8 @@ THIN = 1e-6  # of its length: a narrower strip of nodes is a line
 ROUNDING = 1e-9  # of a triangle's size, by which a point on its border may be outside
 
 
-class Surface(ABC):
-    """A surface through nodes. triangles : (t, 3) its nodes, all of one orientation."""
-
-    triangles: Indices
-
-    @abstractmethod
-    def weights(self, points: Matrix) -> sp.csr_array:
-        """(k, nodes) for points (k, 2); a row of zeros for a point off the surface of triangles."""
-
-    @abstractmethod
-    def covers(self, points: Matrix) -> Mask:
-        """(k,) which points are on the surface, its border included."""
-
-    @property
-    @abstractmethod
-    def areas(self) -> Vector:
-        """(nodes,) tributary areas, mm²: their sum is that of the surface."""
-
-
 @dataclass(frozen=True, eq=False)
-class Grid(Surface):
+class Grid:
     """The rectangles between the lines x and y, after a turn of the plane.
 
     place : the number of the node at each crossing, x running fastest; by default 0, 1, 2, …
@@ -62,6 +42,7 @@ class Grid(Surface):
     turn: Matrix | None = None
 
     def weights(self, points: Matrix) -> sp.csr_array:
+        """(k, nodes) for points (k, 2) on the surface."""
         grids = zip((self.x, self.y), self._turned(points).T, strict=True)
         (ix, s), (iy, t) = (_within(grid, at, self.same) for grid, at in grids)
         nx, k, nodes = len(self.x), len(points), len(self.x) * len(self.y)
@@ -71,6 +52,7 @@ class Grid(Surface):
         return _weights(shares.ravel(), np.tile(np.arange(k), 4), columns, (k, nodes))
 
     def covers(self, points: Matrix) -> Mask:
+        """(k,) which points are on the surface, its border included."""
         points = self._turned(points)
         low, high = (np.array([self.x[k], self.y[k]]) for k in (0, -1))
         inside = (points >= low - self.same) & (points <= high + self.same)
@@ -81,6 +63,7 @@ class Grid(Surface):
 
     @property
     def areas(self) -> Vector:
+        """(nodes,) tributary areas, mm²: their sum is that of the surface."""
         shares = np.outer(_tributary_lengths(self.y), _tributary_lengths(self.x)).ravel()
         if self.place is None:
             return shares
@@ -89,7 +72,8 @@ class Grid(Surface):
         return areas
 
     @property
-    def triangles(self) -> Indices:  # type: ignore[override]
+    def triangles(self) -> Indices:
+        """(t, 3) the nodes of triangles that make up the surface, all of one orientation."""
         nx, ny = len(self.x), len(self.y)
         at = (np.arange(nx * ny) if self.place is None else self.place).reshape(ny, nx)
         a, b, c, d = (each.ravel() for each in (at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]))
@@ -97,7 +81,7 @@ class Grid(Surface):
 
 
 @dataclass(frozen=True, eq=False)
-class Triangles(Surface):
+class Triangles:
     """The cells between nodes (c, 2); the order of the nodes does not change a bit.
 
     order : the nodes sorted by x, then y. middle : their mean.
@@ -135,7 +119,7 @@ class Triangles(Surface):
         return cls(order, middle, nodes, mesh, cKDTree(nodes), cell, kept, start, corner)
 
     @property
-    def triangles(self) -> Indices:  # type: ignore[override]
+    def triangles(self) -> Indices:
         corners = self.mesh.simplices[self.kept].astype(np.intp)
         a, b, c = (self.nodes[corners[:, j]] for j in range(3))
         turned = cross(b - a, c - a) < 0
@@ -143,6 +127,7 @@ class Triangles(Surface):
         return self.order[corners]
 
     def weights(self, points: Matrix) -> sp.csr_array:
+        """As of a Grid; a row of zeros for a point off the surface."""
         points = points - self.middle
         near, node = self.tree.query(points)
         owner = np.where(near <= SAME, -1, self._owners(points))
@@ -191,6 +176,9 @@ class Triangles(Surface):
             on = inside[(shares >= -ROUNDING).all(axis=1)]
             best[on] = triangle[on]
         return np.where(best < len(self.cell), best, -1)
+
+
+Surface = Grid | Triangles
 
 
 def surface_of(nodes: Matrix) -> Surface:
