@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import pandas as pd
-
 from harness.results.atomic_output import refuse_unwritable
 from harness.results.comparison import Incomparable, Side, measurement, read_side, refuse_incomparable
 from harness.results.records import MEASUREMENTS
@@ -42,7 +40,7 @@ def compare(
     key : str, optional
         Only the row with this key.
     out : str or Path, optional
-        Directory for comparison.md, comparison.csv and index.html.
+        Directory for comparison.md and comparison.csv.
 
     Returns
     -------
@@ -90,6 +88,4 @@ def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float 
         of_records([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)
     )
     table = compared(old_rows, new_rows, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
-    names = quoted(old.name), quoted(new.name)
-    both = pd.concat([rows.assign(side=side) for rows, side in zip((old_rows, new_rows), names, strict=True)])
-    return Comparison(*names, table, untimed, both)
+    return Comparison(quoted(old.name), quoted(new.name), table, untimed)

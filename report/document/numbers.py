@@ -36,9 +36,13 @@ def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:
 
 def extent(values: NDArray[np.float64]) -> str:
     """'0.012 … 0.73': the least and the largest value. Zero, where the least is but rounding."""
-    least, largest = float(values.min()), float(values.max())
-    rounding = abs(least) <= ROUNDING * abs(largest)
-    return f"{significant(0.0 if rounding else least)} … {significant(largest)}"
+    low, high = float(values.min()), float(values.max())
+    return f"{significant(without_rounding(low, high))} … {significant(high)}"
+
+
+def without_rounding(least: float, largest: float) -> float:
+    """The least of some values, or zero where it is but rounding of the largest."""
+    return 0.0 if abs(least) <= ROUNDING * abs(largest) else least
 
 
 def power(value: object, digits: int = 3) -> str:

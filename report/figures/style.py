@@ -186,10 +186,6 @@ def forms_text(cells: pd.DataFrame) -> str:
     return f" {words[0].upper()}{words[1:]}." if words else ""
 
 
-def marker_only(style: dict[str, Any]) -> dict[str, Any]:
-    return {**style, "linestyle": ""}
-
-
 def legend_entries(styles: dict[str, dict[str, Any]]) -> list[Line2D]:
     return [Line2D([], [], label=method, **look) for method, look in styles.items()]
 

@@ -88,7 +88,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
 def two_answers_data(answers: list[Answer]) -> Data:
     """The data of the page of two answers on one junction."""
     records = [record for record, _ in answers]
-    named = [f"{record['title']}, {record['method']}" for record in records]
+    named = [f"{record['scene']}: {record['title']}, {record['method']}" for record in records]
     maps = two_answers_maps(records[0], [arrays for _, arrays in answers])
     both = [["first", named[0]], ["second", named[1]]]
     return _with_maps(records, both, maps)

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from report.document.numbers import counted, without_rounding
 from report.figures.junction_maps import cell_edges, grid_of
 from report.page.page_file import Data, choice, entry, exact, packed
 from report.results.answer_record import pair_name
@@ -86,7 +87,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     step = _step(len(series.nodes))
     curves = _exceeded(series, step)
     maps = dict(zip(names, quantiles, strict=True))
-    _added(page, f"{len(series.cases)} cases", series.nodes, maps, series.fasteners)
+    _added(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners)
     (made,) = page["maps"]
     worst, *others = _chosen(series)
     spent, cases = _size(made["fields"]) + len(curves), {}
@@ -157,7 +158,7 @@ def _added(
         return False
     if place not in groups:
         groups.append(place)
-    about = f"{len(nodes)} contacts{f', every {step}th of which is drawn' if step > 1 else ''}."
+    about = counted(len(nodes), "contact") + (f", every {step}th of which is drawn" if step > 1 else "") + "."
     x, y = np.reshape(marks, (-1, 2)).T.tolist()
     page["maps"].append(
         {
@@ -186,13 +187,15 @@ def _frame(nodes: Array) -> Data:
 
 
 def _field(name: str, values: Array) -> Data:
-    """A field with the range of its colours: gaps from 0 or the least, forces from 1/10 000 of the most."""
+    """A field with the range of its colours: gaps from the least, at most 0, forces from 1/10 000 of the
+    most.
+    """
     high = float(np.nanmax(values, initial=0.0)) or 1.0
     force = name == FIELDS["lam"]
     return {
         "kind": "force" if force else "gap",
         "unit": "N" if force else "mm",
-        "low": 1e-4 * high if force else float(np.nanmin(values, initial=0.0)),
+        "low": 1e-4 * high if force else without_rounding(float(np.nanmin(values, initial=0.0)), high),
         "high": high,
         "hover": True,
         "values": packed(values),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zlib
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,23 +70,21 @@ def _named(directory: Path) -> str:
     return str(quoted(near.as_posix()))
 
 
-def banner(rows: pd.DataFrame, **more: object) -> Data:
+def banner(rows: pd.DataFrame, counts: str, warnings: Sequence[str], versions: Sequence[str] = ()) -> Data:
     """The machine, code and dates of some rows, as the top of the page shows them.
 
-    rows : with `machine`, `commit`, `clean` and `recorded_at`. more : `counts`, `versions`, `warnings`, or
-    other words for any of the banner's lines.
+    rows : with `machine`, `commit`, `clean` and `recorded_at`.
     """
     rows = rows.assign(clean=rows["clean"].astype(float))  # true, false or not known
     times = sorted(time for time in rows["recorded_at"] if time)
-    lines = {
+    return {
         "machines": [name or "not recorded" for name in rows["machine"].unique()],
         "commits": commits_text(rows) if len(rows) else "",
         "measured": " to ".join(dict.fromkeys([minute(times[0]), minute(times[-1])])) if times else "",
-        "versions": [],
-        "counts": "",
-        "warnings": [],
+        "versions": versions,
+        "counts": counts,
+        "warnings": warnings,
     }
-    return lines | more
 
 
 def minute(time: str) -> str:
@@ -105,11 +103,9 @@ def column(values: pd.Series[Any]) -> list[Any] | Data:
 
 def packed(values: Array) -> str:
     """An array for a map, of about four digits: base64 of deflated little-endian float32."""
-    bits = np.ascontiguousarray(values, "<f4").view("<u4")
-    finite = np.isfinite(values).ravel()
-    rounded = bits.ravel().copy()
-    rounded[finite] = (rounded[finite] + DIGITS // 2) & ~np.uint32(DIGITS - 1)
-    return b64encode(zlib.compress(rounded.tobytes(), 9)).decode()
+    bits = values.astype("<f4").view("<u4")
+    rounded = (bits + DIGITS // 2) & ~np.uint32(DIGITS - 1)
+    return exact(np.where(np.isfinite(values), rounded, bits).astype("<u4").view("<f4"))
 
 
 def exact(values: Array) -> str:

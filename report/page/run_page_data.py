@@ -20,7 +20,7 @@ from harness.results.schema import LADDERS
 from report.analysis.checks import warnings
 from report.analysis.time_to_solution import STAGES, roads
 from report.document.blocks import records
-from report.document.numbers import listed
+from report.document.numbers import counted, listed
 from report.figures.style import line_styles
 from report.page.contact_maps import hover_names, map_controls, scene_maps
 from report.page.page_figures import PANELS, as_items, map_figure, precision_figure
@@ -189,7 +189,7 @@ def _banner(results: Results) -> Data:
     again = f", {results.left_out} of them measured again or in search of a tolerance"
     return banner(
         rows,
-        counts=f"{len(rows) + results.left_out} rows{again if results.left_out else ''}",
+        counts=counted(len(rows) + results.left_out, "row") + (again if results.left_out else ""),
         versions=[f"{solver} {listed(sorted(found))}" for solver, found in versions.items()],
         warnings=warnings(results),
     )

@@ -19,6 +19,7 @@ NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
 CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
+MEDIANS += ["solver_reported_s", "cholesky_s", "product_s"]
 LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 
@@ -33,7 +34,7 @@ def frame(records: list[dict[str, Any]]) -> pd.DataFrame:
         rows[name] = pd.to_numeric(column, errors="coerce").astype(float)
     for name in TEXTS:
         column = rows[name] if name in rows else pd.Series(None, index=rows.index, dtype=object)
-        rows[name] = column.map(_text)
+        rows[name] = column.map(lambda value: "" if pd.isna(value) else str(value))
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
     rows = rows.drop_duplicates([*CELL, "repeat", "case"], keep="last")
@@ -53,13 +54,6 @@ def _chosen(rows: pd.DataFrame) -> pd.Series[bool]:
 def of_records(records: list[dict[str, Any]]) -> pd.DataFrame:
     """Rows as `frame` makes them, with every text quoted."""
     return frame(quoted(records))
-
-
-def _text(value: object) -> str:
-    return "" if value is None or value != value else str(value)
-
-
-MEDIANS += ["solver_reported_s", "cholesky_s", "product_s"]
 
 
 def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:
@@ -108,24 +102,6 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
     tolerance = tolerance.where(several & (cells["searched"] != 1.0), "")
     method = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
     return cells.assign(method=method, label=method + tolerance)
-
-
-def named_by(cells: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
-    """Cells named group by group: for tables with columns for the `keys`, which the names then omit."""
-    groups = [named(group) for _, group in cells.groupby(keys)]
-    return pd.concat([named(cells.iloc[:0]), *groups], ignore_index=True)
-
-
-def lines_in_order(lines: pd.DataFrame, cells: pd.DataFrame, *first: str) -> pd.DataFrame:
-    """One line per `method` of some cells, indexed or not: sorted by what comes first, then in the order of
-    `in_order`.
-    """
-    places = {name: place for place, name in enumerate(in_order(cells, "method"))}
-    lines = lines.reset_index() if "method" in lines.index.names else lines
-    ordered = lines.assign(place=lines["method"].map(places)).sort_values(
-        [*first, "place"], ignore_index=True
-    )
-    return ordered.drop(columns="place")
 
 
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:

@@ -9,7 +9,7 @@ from report.analysis.standings import ROUND, of_fastest, spreads
 from report.document.blocks import Column, Section, Table, number, word
 from report.document.numbers import power, spread, whole
 from report.results.reader import Results
-from report.results.rows import CELL, named_by
+from report.results.rows import CELL, named
 
 CASE = ["setup_s", "solve_s", "form_s"]
 
@@ -32,7 +32,8 @@ def section(results: Results) -> Section | None:
     lines["once_s"] = groups[["convert_s", "prepare_s"]].max().sum(axis=1)
     lines["first_s"] = groups["first_s"].median()
     lines[["batched", "error_mm"]] = groups[["batched", "error_mm"]].max()
-    lines = named_by(lines.join(spreads(rows, CELL, ["to_library"])).reset_index(), ROUND)
+    lines = lines.join(spreads(rows, CELL, ["to_library"])).reset_index()
+    lines = pd.concat([named(group) for _, group in lines.groupby(ROUND, dropna=False)])
     lines = lines.sort_values(["n", "scene", "threads", "case_s"])
     columns = [
         word("scene", "scene"),

@@ -15,7 +15,7 @@ from report.document.numbers import spread, whole
 from report.figures import style
 from report.figures.line_charts import MARKS, against_contacts, entries, styles_of, yardstick
 from report.results.reader import Results
-from report.results.rows import in_order, lines_in_order
+from report.results.rows import in_order
 
 PANEL = 3.0  # inches
 FEWEST = 3  # sizes of a fit, and scenes of a size for a line against their contacts
@@ -78,7 +78,7 @@ def scaling(results: Results) -> Section | None:
     if not cells["cholesky_s"].notna().any() or cells["n"].nunique() < FEWEST:
         return None
     lines = [_exponents(method, of) for method, of in within.groupby("method")]
-    table = lines_in_order(pd.DataFrame(lines), within)
+    table = pd.DataFrame(lines).set_index("method").loc[in_order(within, "method")].reset_index()
     columns = [
         word("solver (form)", "method"),
         number("sizes", "sizes", whole),

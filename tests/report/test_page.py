@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from hostile_texts import HOSTILE, MADE
 from published_runs import DIRECTORIES
@@ -22,7 +21,6 @@ from report.page.run_page_data import run_data
 from report.results.reader import read
 from report.results.series_results import QUANTILES, quantile_maps
 from report.results.series_results import read as read_series
-from report.writers import comparison_report
 from report.writers.series_report import write as write_series
 
 MOST_BYTES = 3_300_000
@@ -220,7 +218,3 @@ def test_the_banners_name_the_code(tmp_path: Path) -> None:
     assert not clean["warnings"]
     assert "uncommitted" in answer_page_data._banner([record | {"clean": False}])["warnings"][0]
     assert answer_page_data._banner([{"method": "newton"}])["commits"] == "not recorded"
-    rows = pd.DataFrame([record | {"clean": True, "side": "old"}, record | {"clean": False, "side": "new"}])
-    both = comparison_report._banner(rows.assign(machine=["CPU", "other"]))
-    assert "old: " + "a" * 40 in both["commits"]
-    assert [warning.split()[-2] for warning in both["warnings"]] == ["uncommitted", "machine"], both
