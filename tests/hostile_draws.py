@@ -158,14 +158,14 @@ def array_changed(random: Random, path: Path) -> None:
     with np.load(path) as file:
         arrays = dict(file)
     name = list(arrays)[random.integers(len(arrays))]
-    given = arrays.pop(name)
+    array = arrays.pop(name)
     if random.random() < 0.9:
         new = "x" if random.random() < 0.05 else name
         with np.errstate(all="ignore"):
-            arrays[new] = ARRAYS[random.integers(len(ARRAYS))](given) if given.ndim else given * np.nan
-        if random.random() < 0.3 and given.ndim and given.size and given.dtype.kind == "f":
-            arrays[name] = given.copy()
-            arrays[name].flat[random.integers(given.size)] = float(NUMBERS[random.integers(7)])
+            arrays[new] = ARRAYS[random.integers(len(ARRAYS))](array) if array.ndim else array * np.nan
+        if random.random() < 0.3 and array.ndim and array.size and array.dtype.kind == "f":
+            arrays[name] = array.copy()
+            arrays[name].flat[random.integers(array.size)] = float(NUMBERS[random.integers(7)])
     np.savez(path, **arrays)
 
 

@@ -87,7 +87,7 @@ def scene(root: Path) -> Target:
     return Target("scene", 0.3, folder, ("scene.toml", "scene.toml", "points.csv", "gaps.csv"), commands)
 
 
-def own(root: Path, form: str, suffix: str) -> Target:
+def own_files(root: Path, form: str, suffix: str) -> Target:
     folder = made(root / form)
     name = "own" if suffix == ".mtx" else f"own{suffix}"
     formats.FORMATS[form].write(folder / name, own_matrices())
@@ -151,14 +151,14 @@ def results(root: Path) -> Target:
         """The gate passes only what is there, complete and right."""
         if code or words[0] != "gate":
             return
-        found = rows_of(folder / "done")
+        rows = rows_of(folder / "done")
         path = folder / "done" / "suite.toml"
         same_suite = path.is_file() and path.read_bytes() == suite_text
         if not path.is_file():
             raise Fault("wrong", "passed, and nobody knows which rows there should be")
-        if same_suite and {row["key"] for row in found if row["gated"]} != set(exact):
+        if same_suite and {row["key"] for row in rows if row["gated"]} != set(exact):
             raise Fault("wrong", "passed without all rows")
-        known = [row for row in found if row["gated"] and row["key"] in exact]
+        known = [row for row in rows if row["gated"] and row["key"] in exact]
         wrong = [r["key"] for r in known if not abs(answer(folder, r) - exact[r["key"]]).max() <= 2e-7]
         if wrong:
             raise Fault("wrong", f"passed {wrong}")
@@ -278,5 +278,5 @@ MAKERS = (scene, cached, results, series, placed, superelements, suite, compared
 
 def all_targets(root: Path) -> list[Target]:
     forms = {"npz": ".npz", "mtx": ".mtx", "abaqus": ".mtx", "op4": ".op4", "dmig": ".pch"}
-    of_formats = [own(root, form, suffix) for form, suffix in forms.items()]
+    of_formats = [own_files(root, form, suffix) for form, suffix in forms.items()]
     return [*(make(root) for make in MAKERS), *of_formats]

@@ -89,10 +89,10 @@ def _limited(seconds: float, clock: int) -> Iterator[None]:
         raise Fault("hang", f"more than {seconds} s")
 
     sent = signal.SIGPROF if clock == signal.ITIMER_PROF else signal.SIGALRM
-    before = signal.signal(sent, stop)
+    previous = signal.signal(sent, stop)
     signal.setitimer(clock, seconds)
     try:
         yield
     finally:
         signal.setitimer(clock, 0)
-        signal.signal(sent, before)
+        signal.signal(sent, previous)

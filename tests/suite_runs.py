@@ -70,15 +70,15 @@ def wait_for(condition: Any) -> Any:
 
 def processes(cache: Path) -> list[psutil.Process]:
     """Those that were started with this cache, which marks a test's own."""
-    found = []
+    living = []
     for process in psutil.process_iter():
         try:
             ours = process.environ().get("RIVETBENCH_CACHE") == str(cache)
             if ours and process.status() != psutil.STATUS_ZOMBIE:
-                found.append(process)
+                living.append(process)
         except psutil.Error:
             continue
-    return found
+    return living
 
 
 def all_end(cache: Path) -> bool:

@@ -146,8 +146,8 @@ def _problem(scene: str, n: int, active: int) -> dict[str, Any]:
 def _scene_file(directory: Path, scene: str, n: int, active: int, random: np.random.Generator) -> None:
     nx, ny = GRIDS[n]
     X, Y = np.meshgrid(np.linspace(0, 4000, nx), np.linspace(0, 400, ny), indexing="ij")
-    before = 0.6 + 0.2 * np.sin(X / 300) * np.cos(Y / 150) + 0.05 * np.sin(X / 90 + Y / 70)
-    pressed = before - 0.55 * (0.6 + 0.4 * np.cos(X / 700)) - 0.05 * np.cos(Y / 60)
+    initial = 0.6 + 0.2 * np.sin(X / 300) * np.cos(Y / 150) + 0.05 * np.sin(X / 90 + Y / 70)
+    pressed = initial - 0.55 * (0.6 + 0.4 * np.cos(X / 700)) - 0.05 * np.cos(Y / 60)
     level = np.sort(pressed.ravel())[active]
     after = np.maximum(pressed - level, 0.0)
     fasteners = np.array([(x, y) for x in np.linspace(100, 3900, 39) for y in (100.0, 300.0)])
@@ -158,7 +158,7 @@ def _scene_file(directory: Path, scene: str, n: int, active: int, random: np.ran
     np.savez(
         directory / "scenes" / (scene.replace("/", "_") + ".npz"),
         contact_nodes=np.column_stack([X.ravel(), Y.ravel()]),
-        gap_before=before.ravel(), gap_after=after.ravel(), lam=lam, fasteners=fasteners,
+        gap_before=initial.ravel(), gap_after=after.ravel(), lam=lam, fasteners=fasteners,
     )  # fmt: skip
 
 

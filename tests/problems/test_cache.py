@@ -44,14 +44,6 @@ def test_an_entry_comes_back_memory_mapped_and_read_only() -> None:
         np.testing.assert_array_equal(array, ARRAYS[name])
 
 
-def test_storing_again_replaces_the_entry(root: Path) -> None:
-    storage.store("key", ARRAYS, {})
-    storage.store("key", {"three": np.ones(3)}, {"n": 1})
-    found = storage.load("key")
-    assert list(found[0]) == ["three"]
-    assert [path.name for path in root.iterdir()] == ["key"]
-
-
 @pytest.mark.parametrize("kept", [0, 100, -8, None])
 def test_a_truncated_or_missing_array_is_named_with_its_sizes(root: Path, kept: int | None) -> None:
     storage.store("key", ARRAYS, {})

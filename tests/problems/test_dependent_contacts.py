@@ -104,7 +104,7 @@ def test_small_integers_are_refused_exactly_where_their_rank_says_so() -> None:
 def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
     """In the sparse form there was a raw "Factor is exactly singular"."""
     K, A, f, g = np.eye(N) * 4, np.eye(N, 3)[:, [0, 1, 0]], np.ones(N), np.zeros(3)
-    np.savez(own := tmp_path / "own.npz", K=K, A=A, f=f, g=g)
+    np.savez(path := tmp_path / "own.npz", K=K, A=A, f=f, g=g)
     np.savez(tmp_path / "x.npz", x=f)
     np.save(tmp_path / "gaps.npy", np.zeros((2, 3)))
     places = {"OWN": "own.npz", "X": "x.npz", "GAPS": "gaps.npy", "NEW": "new", "NEW.npz": "new.npz"}
@@ -112,7 +112,7 @@ def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
     done = harness(*given)
     assert done.exit_code == 2, done.output
     said = " ".join(done.output.split())
-    assert f"{own}: A[:, 2] = 'dependent on A[:, 0]': must not depend on the columns before it" in said
+    assert f"{path}: A[:, 2] = 'dependent on A[:, 0]': must not depend on the columns before it" in said
 
 
 def test_contacts_that_the_rounding_of_Q_makes_dependent_are_said() -> None:

@@ -114,7 +114,7 @@ def test_effects_that_contradict_each_other_are_both_named(tmp_path: Path, case:
 
 def test_everything_wrong_in_a_file_is_said_in_one_go(tmp_path: Path) -> None:
     """A table that cannot be read hides neither its part's name nor what the others contradict."""
-    found = faults(
+    all_faults = faults(
         tmp_path,
         'kind = "rigid_tool"\npart = "b"',
         'kind = "rigid_tool"\npart = "b"\ndistance = 1',
@@ -123,7 +123,7 @@ def test_everything_wrong_in_a_file_is_said_in_one_go(tmp_path: Path) -> None:
         'kind = "friction"',
         'kind = "clamps"\nclamping_force = 1\nradius = -1',
     )
-    assert [fault.key for fault in found] == [
+    assert [fault.key for fault in all_faults] == [
         "effect[2] (local_thickness).thickness",
         "effect[4].kind",
         "effect[5] (clamps).radius",
@@ -164,10 +164,10 @@ def test_all_that_is_wrong_with_a_file_and_its_table_is_said_at_once(tmp_path: P
     (tmp_path / "holes.csv").write_text("\n".join(rows) + "\n")
     table = 'kind = "{}"\n{} = -1\nfile = "holes.csv"'
     good = 'kind = "fasteners"\npreload = 1\nbetween = ["b", "a"]\nfile = "holes.csv"'
-    found = faults(tmp_path, table.format("clamps", "clamping_force"), good)
+    all_faults = faults(tmp_path, table.format("clamps", "clamping_force"), good)
     file, scene = str(tmp_path / "holes.csv"), str(tmp_path / "scene.toml")
     unreadable = [(file, "line 3", "2,ten,10"), (file, "line 7", "5,90")]
-    assert [(fault.where, fault.key, fault.value) for fault in found] == [
+    assert [(fault.where, fault.key, fault.value) for fault in all_faults] == [
         (scene, "effect[0] (clamps).clamping_force", -1),
         *unreadable,
         *unreadable,
@@ -175,7 +175,7 @@ def test_all_that_is_wrong_with_a_file_and_its_table_is_said_at_once(tmp_path: P
         (file, "line 5", [101.0, 10.0]),
         (file, "line 6", [10.0, -1.0]),
     ]
-    assert all("0 … 100 × 0 … 50 mm" in fault.allowed for fault in found[-2:])
+    assert all("0 … 100 × 0 … 50 mm" in fault.allowed for fault in all_faults[-2:])
 
 
 @pytest.mark.parametrize(

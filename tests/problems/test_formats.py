@@ -46,23 +46,23 @@ def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, A
 
 @pytest.mark.parametrize("form", [form for form in formats.FORMATS if form != "dmig"])
 def test_a_round_trip_is_bit_for_bit(form: str, tmp_path: Path) -> None:
-    wanted, found = there_and_back(form, tmp_path)
+    wanted, read_back = there_and_back(form, tmp_path)
     for name in "KA":
-        np.testing.assert_array_equal(found[name], wanted[name].toarray())
+        np.testing.assert_array_equal(read_back[name], wanted[name].toarray())
     for name in "fg":
-        np.testing.assert_array_equal(found[name], wanted[name])
+        np.testing.assert_array_equal(read_back[name], wanted[name])
     if form == "npz":
-        np.testing.assert_array_equal(found["nodes"], wanted["nodes"])
+        np.testing.assert_array_equal(read_back["nodes"], wanted["nodes"])
 
 
 def test_dmig_keeps_ten_digits(tmp_path: Path) -> None:
     """pyyeti sets how numpy prints when it is imported, and tables would lose their last digits."""
-    wanted, found = there_and_back("dmig", tmp_path)
+    wanted, read_back = there_and_back("dmig", tmp_path)
     assert str(np.float64(1 / 3)) == repr(1 / 3)
-    np.testing.assert_allclose(found["K"], wanted["K"].toarray(), rtol=1e-9)
-    np.testing.assert_array_equal(found["A"], wanted["A"].toarray())
-    np.testing.assert_allclose(found["f"], wanted["f"], rtol=1e-9)
-    np.testing.assert_allclose(found["g"], wanted["g"], rtol=1e-9)
+    np.testing.assert_allclose(read_back["K"], wanted["K"].toarray(), rtol=1e-9)
+    np.testing.assert_array_equal(read_back["A"], wanted["A"].toarray())
+    np.testing.assert_allclose(read_back["f"], wanted["f"], rtol=1e-9)
+    np.testing.assert_allclose(read_back["g"], wanted["g"], rtol=1e-9)
 
 
 def test_dmig_cards_by_their_columns(tmp_path: Path) -> None:
@@ -70,18 +70,18 @@ def test_dmig_cards_by_their_columns(tmp_path: Path) -> None:
     each, ten digits; of the symmetric K one triangle."""
     data = matrices(*small())
     formats.FORMATS["dmig"].write(tmp_path / "p.pch", data)
-    found: dict[str, dict[tuple[int, int], float]] = {}
+    read_back: dict[str, dict[tuple[int, int], float]] = {}
     for line in (tmp_path / "p.pch").read_text().splitlines():
         if line.startswith("DMIG*"):
             name, column = line[8:24].strip(), int(line[24:40])
         elif line.startswith("*"):
             value = float(line[40:56].replace("D", "E"))
-            found.setdefault(name, {})[int(line[8:24]) - 1, column - 1] = value
+            read_back.setdefault(name, {})[int(line[8:24]) - 1, column - 1] = value
     wanted = {"K": sp.tril(data["K"]), "A": data["A"], "F": data["f"][:, None], "G": data["g"][:, None]}
     for name, matrix in wanted.items():
         dense = matrix.toarray() if sp.issparse(matrix) else matrix
         read = np.zeros(dense.shape)
-        for at, value in found[name].items():
+        for at, value in read_back[name].items():
             read[at] = value
         np.testing.assert_array_equal(read, rounded(dense, 10))
 
@@ -284,10 +284,10 @@ def test_an_op4_that_ends_early_has_whole_matrices_or_is_refused(tmp_path: Path)
     for length in range(0, len(whole), 3):
         path.write_bytes(whole[:length])
         try:
-            found = formats.read(path)
+            read_back = formats.read(path)
         except InputError:
             refused += 1
         else:
-            for name, values in found.items():
+            for name, values in read_back.items():
                 np.testing.assert_array_equal(values, wanted[name])
     assert refused > 0.99 * len(whole) / 3

@@ -64,12 +64,12 @@ def hertz(elements: int) -> Contact:
 
     answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
     assert answer.status == "solved"
-    known = best_of_candidates(data, load, first=[("newton", answer.lam)])
-    assert known.bound_mm < 1e-10
-    assert abs(known.x - np.asarray(answer.x)).max() < 1e-10
-    assert 5 < known.active.sum() < len(top) - 3
-    whole = np.append(2 * known.lam[0], known.lam[1:])  # the cell at x = 0 is half there
-    force = 2 * known.lam.sum()
+    reference = best_of_candidates(data, load, first=[("newton", answer.lam)])
+    assert reference.bound_mm < 1e-10
+    assert abs(reference.x - np.asarray(answer.x)).max() < 1e-10
+    assert 5 < reference.active.sum() < len(top) - 3
+    whole = np.append(2 * reference.lam[0], reference.lam[1:])  # the cell at x = 0 is half there
+    force = 2 * reference.lam.sum()
     half_width = np.sqrt(4 * force * RADIUS / (np.pi * CONTACT_MODULUS))
     largest = np.sqrt(force * CONTACT_MODULUS / (np.pi * RADIUS))
     return Contact(x, whole * elements, float(half_width), float(largest))
@@ -98,8 +98,8 @@ def test_half_width_and_pressure_converge(meshes: list[Contact]) -> None:
         assert of_meshes[-1] < 1e-3
 
 
-def deviation(found: Contact) -> float:
+def deviation(contact: Contact) -> float:
     """From the half ellipse, of the largest pressure, up to 0.9 a."""
-    share = found.x[found.x < 0.9 * found.half_width] / found.half_width
-    pressure = found.pressure[: len(share)] / found.largest
+    share = contact.x[contact.x < 0.9 * contact.half_width] / contact.half_width
+    pressure = contact.pressure[: len(share)] / contact.largest
     return float(abs(pressure - np.sqrt(1 - share**2)).max())

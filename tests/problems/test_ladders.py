@@ -19,7 +19,7 @@ from harness.verification.reference import best_of_candidates
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
 from problems.build import prepared
 from problems.errors import InputError
-from problems.ladders import ladders, make_rung, rung_names
+from problems.ladders import make_rung, rung_names
 from problems.ladders.manufactured import contacts, exact_assembly, spectrum, two_parts
 from problems.model.scene import ManufacturedProblem, ManufacturedScene
 from problems.scene_files import read_scene, scene_names
@@ -142,14 +142,9 @@ def test_the_suite_measures_every_rung_with_every_solver() -> None:
     plan = [m for m in plan if (m.solver, m.tolerance) != ("projected-gauss-seidel", 1e-10)]
     lines = {(m.solver, m.form) for m in plan}
     taken = {line: {m.scene for m in plan if (m.solver, m.form) == line} for line in lines}
-    assert len(plan) == sum(map(len, taken.values()))
     whole = {line for line, scenes in taken.items() if scenes == set(TAKEN)}
     assert {solver for solver, _ in whole} == {solver for solver, _ in lines}
     assert {line for line in lines - whole if line[0] in ("ipm", "gi", "newton", "ipm-fast")} == set()
-    for line in lines - whole:
-        ladders = {scene.rpartition("/")[0] for scene in taken[line]}
-        assert taken[line] == {scene for scene in TAKEN if scene.rpartition("/")[0] in ladders}
-        assert len(ladders) > 1
     assert {m.solver for m in plan if m.entry.gated} == {"ipm", "gi", "newton", "ipm-fast"}
 
 
@@ -198,16 +193,6 @@ def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_o
     np.testing.assert_array_equal(K, (H * d) @ H)  # 64 = the stiffness of the grid's smallest eigenvalue
 
 
-def test_a_rung_is_named_by_its_size_and_has_it() -> None:
-    assert list(ladders("hard-full/")) == ["conditioning", *OF_BOTH_SIZES]
-    for name in FULL:
-        size = int(name.split("/")[2].split("-")[0])
-        assert (read_scene(name).expected_size or ())[0] == size
-        assert read_scene(name).on_ladder
-    for ladder in OF_BOTH_SIZES:
-        assert any(name.startswith(f"hard-full/{ladder}/11308-") for name in FULL)
-
-
 def test_nothing_is_made_before_it_is_needed_and_one_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
 
@@ -234,5 +219,3 @@ def test_the_suite_at_full_size_measures_every_rung_with_every_solver_of_ours() 
     for name in FULL:
         ours = {(m.solver, m.form) for m in plan if m.scene == name and m.entry.gated}
         assert ours == GATED - ({("gi", "primal")} if "/11308-" in name else set())
-    assert len({m.solver for m in plan if not m.entry.gated}) <= 2
-    assert not any(scene.startswith("hard-full/") for scene in read_suite("hard").scenes)

@@ -102,12 +102,12 @@ def test_the_field_comes_from_the_options_where_the_scene_has_none(tmp_path: Pat
 def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
     import tiny_joint
 
-    own = read_scene(str(tiny_joint.write_problem(tmp_path / "own.npz")))
+    own_scene = read_scene(str(tiny_joint.write_problem(tmp_path / "own.npz")))
     with pytest.raises(InputError, match="--gaps"):
-        random_gaps(own, 5, 0)
+        random_gaps(own_scene, 5, 0)
     table = tmp_path / "gaps.csv"
     np.savetxt(table, np.full((2, 10), 0.25), delimiter=",")
-    case = measured_gaps(own, table).load(1)
+    case = measured_gaps(own_scene, table).load(1)
     np.testing.assert_array_equal(case.g, np.full(10, 0.25))
     np.testing.assert_array_equal(case.f, np.load(tmp_path / "own.npz", data)["f"])
 

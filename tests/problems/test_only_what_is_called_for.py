@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 from effect_tables import TABLES, scene_of
-from small_joints import make_joint, make_scene, untied
+from small_joints import make_scene, untied
 
 from problems.build import prepared
-from problems.model.effect_tables import effect_class, effect_kinds
+from problems.model.effect_tables import effect_kinds
 from problems.model.scene import plain
 from problems.scene_files import read_scene, scene_names
 
@@ -80,17 +80,6 @@ def test_a_named_effect_imports_itself_alone(tmp_path: Path) -> None:
     assert effects == [[f"problems.effects.{kind}"] for kind in kinds]
 
 
-def test_a_parameter_that_is_not_given_is_not_in_the_key() -> None:
-    """`between` came later than the scenes that do without it: their keys must not know of it."""
-    for kind, given in (
-        ("initial_gap", {"mean": 0.6}),
-        ("fasteners", {"preload": 1.0, "points": [[1.0, 1.0]]}),
-    ):
-        assert "between" not in plain(effect_class(kind).model_validate({"kind": kind, **given}))
-        named = plain(effect_class(kind).model_validate({"kind": kind, "between": ["a", "b"], **given}))
-        assert named["between"] == ["a", "b"]
-
-
 def test_keys_of_packaged_scenes_are_made_of_these_names_alone() -> None:
     """What enters a scene's key, written down: a name added here outdates every published result."""
     parameters = {
@@ -123,13 +112,3 @@ def test_an_effect_on_loads_keeps_the_assembly(kind: str, tmp_path: Path) -> Non
     assert with_it.assembly_key == without.assembly_key
     assert prepared(untied(with_it)).key == prepared(without).key
     assert with_it.key != without.key
-
-
-def test_a_tool_changes_the_assembly_as_its_contact_does(tmp_path: Path) -> None:
-    from_effect = read_scene(str(scene_of(tmp_path, "rigid_tool")))
-    part = {"thickness": 2.0, "north": {"length": 40.0, "elements": 2}, "clamped": ["north"]}
-    grid = {"length": 100.0, "width": 50.0, "nodes": (4, 3)}
-    listed = make_joint(
-        part, part | {"name": "b", "thickness": 3.0}, contacts=[["a", "b"], ["b", "tool"]], **grid
-    )
-    assert from_effect.assembly_key == make_scene(listed).assembly_key

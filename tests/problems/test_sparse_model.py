@@ -63,13 +63,13 @@ def check_same(scene: JointScene) -> None:
     whole_force = np.zeros(model.n)
     whole_force[junction] = force
     lam = random.standard_normal(model.m)
-    for found, expected in (
+    for value, expected in (
         (model.at_junction(whole.assembly.K.solve(load.f)), dense.assembly.K.solve(case.f)),
         (model.at_junction(whole.assembly.K.solve(whole_force)), dense.assembly.K.solve(force)),
         (whole.overlap(load), dense.overlap(case)),
         (whole.compliance @ lam, dense.Q @ lam),
     ):
-        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-9 * abs(expected).max(initial=0.0))
+        np.testing.assert_allclose(value, expected, rtol=0, atol=2e-9 * abs(expected).max(initial=0.0))
 
 
 @pytest.mark.parametrize("kind", sorted(TABLES))

@@ -32,17 +32,17 @@ def test_each_case_is_a_scene_with_some_of_the_fasteners(form: str) -> None:
     cases = drawn_cases(scene, form, fasteners=True, cases=12, seed=4)  # type: ignore[arg-type]
     plain = drawn_cases(scene, form, cases=12, seed=4)  # type: ignore[arg-type]
     assert isinstance(cases, Stream)
-    before: set[int] = set()
+    out_before: set[int] = set()
     for k in range(12):
-        found, known = cases.load(k), cases.parameters(k)
-        out = set(map(int, known["fasteners_out"].split()))
-        assert len(out ^ before) == k % 2  # one comes or goes in every second case
-        before = out
+        case, parameters = cases.load(k), cases.parameters(k)
+        out = set(map(int, parameters["fasteners_out"].split()))
+        assert len(out ^ out_before) == k % 2  # one comes or goes in every second case
+        out_before = out
         left = [place for i, place in enumerate(PLACES) if i not in out]
         with_left = load_case(scene_of(*([fasteners(*left)] if left else [])), form)  # type: ignore[arg-type]
-        np.testing.assert_allclose(found.f, with_left.f, atol=1e-12)
-        np.testing.assert_array_equal(found.g, plain.load(k // 2).g)
-        assert known["gap_seed"] == plain.parameters(k // 2)["gap_seed"]
+        np.testing.assert_allclose(case.f, with_left.f, atol=1e-12)
+        np.testing.assert_array_equal(case.g, plain.load(k // 2).g)
+        assert parameters["gap_seed"] == plain.parameters(k // 2)["gap_seed"]
     assert cases.load(5).f is cases.load(6).f  # K⁻¹f is then computed once
     assert cases.key != plain.key
 

@@ -139,11 +139,6 @@ PAIRS: dict[str, tuple[Callable[[Path], list[Tables]], str, str]] = {
         "one line",
         "off a",
     ),
-    "nearly on a line": (
-        lambda f: two(f, xyz=NODES * [1, 1e-6, 1] + np.arange(24)[:, None] * [1, 0, 0]),
-        "one line",
-        "off a",
-    ),
 }
 
 

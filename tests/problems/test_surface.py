@@ -136,12 +136,6 @@ def test_rounded_coordinates_leave_no_weight_that_is_no_number() -> None:
         assert surface.areas.sum() == pytest.approx(477.5, rel=1e-3)
 
 
-def test_a_square_cut_out_stays_open_to_its_corners() -> None:
-    x, y = crossings(np.arange(0, 101, 5.0), np.arange(0, 81, 5.0)).T
-    out = (abs(x - 50) < 10) & (abs(y - 40) < 10)
-    assert surface_of(np.column_stack([x, y])[~out]).areas.sum() == pytest.approx(100 * 80 - 400)
-
-
 def test_nodes_on_a_line_are_no_surface() -> None:
     line = np.linspace(0, 9, 10)[:, None] * [1.0, 2.0]
     with pytest.raises(ValueError, match="one line"):

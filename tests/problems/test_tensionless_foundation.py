@@ -102,18 +102,18 @@ def test_the_pressed_beam_converges_to_its_closed_form() -> None:
         "free end": -slope * (PRESSED_LENGTH / BETA - edge),
     }
     beams = [pressed(elements) for elements in ELEMENTS]
-    found = [
+    computed = [
         {"edge": beam.edge, "force": 2 * beam.lam.sum(), "moment": beam.lam @ beam.x, "free end": beam.w[-1]}
         for beam in beams
     ]
-    check(found, exact)
+    check(computed, exact)
 
 
 def test_the_lifted_beam_converges_to_its_closed_form() -> None:
     exact = {"edge": 1 / BETA, "force": 17 * WEIGHT / (6 * BETA), "moment": 5 * WEIGHT / (6 * BETA**2)}
     length = LIFTED_LENGTH / BETA
     beams = [lifted(elements) for elements in ELEMENTS]
-    found = [
+    computed = [
         {
             "edge": beam.edge,
             "force": 2 * (WEIGHT * length - beam.lam.sum()),
@@ -121,13 +121,13 @@ def test_the_lifted_beam_converges_to_its_closed_form() -> None:
         }
         for beam in beams
     ]
-    check(found, exact)
+    check(computed, exact)
 
 
-def check(found: list[dict[str, float]], exact: dict[str, float]) -> None:
+def check(computed: list[dict[str, float]], exact: dict[str, float]) -> None:
     """Four times the elements leave a sixteenth of the error, about, as order 2 does."""
     for name, value in exact.items():
-        errors = [abs(each[name] / value - 1) for each in found]
+        errors = [abs(each[name] / value - 1) for each in computed]
         assert errors == sorted(errors, reverse=True), name
         assert errors[-1] < errors[0] / 12, name
         assert errors[-1] < 3e-4, name

@@ -16,15 +16,15 @@ def test_the_residuals_are_those_of_the_judge() -> None:
     lam, x = rng.uniform(0, 50, 15), rng.normal(0, 0.1, 27)
     K, A = sla.block_diag(*prepared.assembly.K.matrices), prepared.assembly.A.toarray()
     for own in (None, x):
-        (found,) = assess(proof_of(prepared), [case], [lam], [own])
+        (answer,) = assess(proof_of(prepared), [case], [lam], [own])
         at = np.linalg.solve(K, case.f - A @ lam) if own is None else own
         gap = case.g - A.T @ at
-        np.testing.assert_allclose(found.x, at, atol=1e-12)
-        np.testing.assert_allclose(found.gap, gap, atol=1e-12)
-        assert found.primal_residual == pytest.approx(max(-gap.min(), 0))
+        np.testing.assert_allclose(answer.x, at, atol=1e-12)
+        np.testing.assert_allclose(answer.gap, gap, atol=1e-12)
+        assert answer.primal_residual == pytest.approx(max(-gap.min(), 0))
         out_of_balance = abs(K @ at - case.f + A @ lam).max()
-        assert found.dual_residual == pytest.approx(out_of_balance, rel=1e-6, abs=1e-8)
-        assert found.duality_gap == pytest.approx(abs(at @ K @ at - case.f @ at + case.g @ lam), rel=1e-6)
+        assert answer.dual_residual == pytest.approx(out_of_balance, rel=1e-6, abs=1e-8)
+        assert answer.duality_gap == pytest.approx(abs(at @ K @ at - case.f @ at + case.g @ lam), rel=1e-6)
 
 
 def test_a_block_is_its_cases_one_by_one() -> None:
@@ -33,10 +33,10 @@ def test_a_block_is_its_cases_one_by_one() -> None:
     lams = [solve_by_nnls(prepared, case)[1] for case, _ in cases]
     proof = proof_of(prepared)
     together = assess(proof, [load for _, load in cases], lams, [None] * 5)
-    for (case, load), lam, found in zip(cases, lams, together, strict=True):
+    for (case, load), lam, answer in zip(cases, lams, together, strict=True):
         alone = assess(proof, [load], [lam], [None])[0]
-        np.testing.assert_allclose(found.x, alone.x, rtol=0, atol=1e-13)
-        assert found.bound_mm < 1e-9 > alone.bound_mm
+        np.testing.assert_allclose(answer.x, alone.x, rtol=0, atol=1e-13)
+        assert answer.bound_mm < 1e-9 > alone.bound_mm
         known = best_of_candidates(prepared, case)
-        assert abs(found.x - known.x).max() <= found.bound_mm + known.bound_mm
-        assert found.bound_mm < 1e-9
+        assert abs(answer.x - known.x).max() <= answer.bound_mm + known.bound_mm
+        assert answer.bound_mm < 1e-9

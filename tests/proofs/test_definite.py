@@ -194,12 +194,12 @@ def test_independence_counts_the_rounding_of_its_products() -> None:
 def test_compliance_the_backward_error_of_the_factor_counts() -> None:
     """(K⁻¹)_ii ≤ (1 + e/κ) (UᵀU)⁻¹_ii, e/κ one hundredth here and then more."""
     K = DenseBlock(np.diag([1.0, 2.0**40]).T)
-    each, ones = gamma(6), np.ones(2)
+    rounding, ones = gamma(6), np.ones(2)
     for share in (0.01, 1.0, 100.0):
-        kappa = each * (1 + 2.0**40) / share
+        kappa = rounding * (1 + 2.0**40) / share
         assert 1 + share <= K.largest_compliance(ones, kappa) <= 1.02 * (1 + 1.02 * share)
     D = np.array([1.0, 2.0**-20])  # DKD = I
-    assert 2.0 <= K.largest_compliance(D, 2 * each) <= 2.1
+    assert 2.0 <= K.largest_compliance(D, 2 * rounding) <= 2.1
     assert K.largest_compliance(ones, 0.0) == np.inf
 
 

@@ -63,12 +63,12 @@ def test_a_residual_lies_within_its_bound(
     M, hi = wild(rng, 6, 9) * (rng.random((6, 9)) < 0.7), wild(rng, 9, cases)
     x = doubled(hi, hi * rng.uniform(-1e-16, 1e-16, hi.shape))
     value = (M @ hi) * (1 + 1e-15 * rng.standard_normal((6, cases)))
-    found = residual_of(value, M, x, kind, sharp)
+    total = residual_of(value, M, x, kind, sharp)
     for column in range(cases):
-        assert max(missed(found, column, wanted_of(value, M, x, column))) <= 0
+        assert max(missed(total, column, wanted_of(value, M, x, column))) <= 0
     sizes = abs(M) @ abs(hi).max(axis=1)
     assert (
-        found.error.max(axis=1) <= (1e-27 if sharp else 1e-20) * sizes + 3e-16 * abs(found.value).max(axis=1)
+        total.error.max(axis=1) <= (1e-27 if sharp else 1e-20) * sizes + 3e-16 * abs(total.value).max(axis=1)
     ).all()
 
 
@@ -101,12 +101,12 @@ TERMS = {
 @pytest.mark.parametrize("term", TERMS)
 def test_what_is_not_exact_is_in_doubt_by_the_size_of_its_terms(kind: str, term: str) -> None:
     """Rows of alternating signs, whose sums are zero: nothing of the doubt is due to the value."""
-    m, v, each = TERMS[term]
+    m, v, size = TERMS[term]
     n = 64
     M, x = np.full((1, n), m) * (-1.0) ** np.arange(n), doubled(np.full((n, 1), v))
     found = residual_of(np.zeros((1, 1)), M, x, kind, sharp="-" not in term)
     assert found.value[0, 0] == 0.0
-    assert gamma(n) * n * each <= found.error[0, 0] <= 100 * gamma(n) * n * each
+    assert gamma(n) * n * size <= found.error[0, 0] <= 100 * gamma(n) * n * size
 
 
 def test_the_rounding_of_the_sum_counts() -> None:

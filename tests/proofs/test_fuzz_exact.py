@@ -82,29 +82,29 @@ def _max_error(x: Vector, exact: Vector) -> Fraction:
 def _check(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
     data = Prepared(made.assembly)
     spectra = [np.linalg.eigvalsh(K) for K in made.assembly.K.matrices]
-    condition = max(each[-1] for each in spectra) / min(each[0] for each in spectra)
+    condition = max(values[-1] for values in spectra) / min(values[0] for values in spectra)
     if not 0 < condition < LARGEST_CONDITION:
         return
     proof = proof_of(data)
-    references = [_check_reference(log, data, each) for each in made.loads]
+    references = [_check_reference(log, data, draw) for draw in made.loads]
     for K in (made.assembly.K, made.assembly.K.as_sparse()):
         _check_any_point(log, proof_of(Prepared(replace(made.assembly, K=K))), made.loads, random)
-    lams: list[list[Vector]] = [[each.lam, *_hostile_forces(each, random)] for each in made.loads]
+    lams: list[list[Vector]] = [[draw.lam, *_hostile_forces(draw, random)] for draw in made.loads]
     if made.ordinary:
         log.seen["ordinary"] += len(made.loads)
         other = OTHERS[random.integers(len(OTHERS))]
-        allowed = [promises(data, each, condition) for each in made.loads]
+        allowed = [promises(data, draw, condition) for draw in made.loads]
         for variant in (*USUAL, other):
             for k, lam in _check_solver(log, data, made.loads, references, allowed, variant):
                 lams[k].append(lam)
         log.seen["proven"] += sum(known.bound_mm < np.inf for known in references)
-    for each, tried in zip(made.loads, lams, strict=True):
+    for draw, tried in zip(made.loads, lams, strict=True):
         enough = float(10.0 ** -random.integers(0, 30))
-        vouched = assess(proof, [each.load] * len(tried), tried, [None] * len(tried), enough)
-        given = [each.x * (1 + random.normal(0, 10.0 ** -random.integers(1, 16))) for _ in tried]
-        vouched += assess(proof, [each.load] * len(tried), tried, given, enough)
+        vouched = assess(proof, [draw.load] * len(tried), tried, [None] * len(tried), enough)
+        given = [draw.x * (1 + random.normal(0, 10.0 ** -random.integers(1, 16))) for _ in tried]
+        vouched += assess(proof, [draw.load] * len(tried), tried, given, enough)
         for found in vouched:
-            _bound(log, "series", found.x, found.bound_mm, each.x)
+            _bound(log, "series", found.x, found.bound_mm, draw.x)
     if random.random() < 0.05:
         _check_interface(log, made, random)
 
@@ -120,27 +120,27 @@ def _check_any_point(
 ) -> None:
     """x and λ ≥ 0 that are wrong on purpose, all load cases at once, without and with a refinement."""
     size = 10.0 ** -random.integers(0, 20, len(loads))
-    xs = [each.x * (1 + s * random.normal(size=len(each.x))) for each, s in zip(loads, size, strict=True)]
+    xs = [draw.x * (1 + s * random.normal(size=len(draw.x))) for draw, s in zip(loads, size, strict=True)]
     lams = [
-        each.lam * (1 + s * random.normal(size=len(each.lam))) for each, s in zip(loads, size, strict=True)
+        draw.lam * (1 + s * random.normal(size=len(draw.lam))) for draw, s in zip(loads, size, strict=True)
     ]
     for enough in (np.inf, 10.0 ** -random.integers(0, 30)):
-        found = proof.proven([each.load for each in loads], lams, xs, enough)
-        for each, mine in zip(loads, found, strict=True):
-            _bound(log, "any point", mine.x.hi, mine.bound_mm, each.x)
+        found = proof.proven([draw.load for draw in loads], lams, xs, enough)
+        for draw, mine in zip(loads, found, strict=True):
+            _bound(log, "any point", mine.x.hi, mine.bound_mm, draw.x)
 
 
-def _hostile_forces(each: ExactLoad, random: np.random.Generator) -> list[Vector]:
+def _hostile_forces(draw: ExactLoad, random: np.random.Generator) -> list[Vector]:
     """Forces near the exact ones, and far from them."""
-    scale = abs(each.lam).max(initial=0.0)
-    noise = random.normal(size=(3, len(each.lam))) * scale
-    return [each.lam + 1e-12 * noise[0], each.lam + 1e-3 * noise[1], noise[2], np.zeros_like(each.lam)]
+    scale = abs(draw.lam).max(initial=0.0)
+    noise = random.normal(size=(3, len(draw.lam))) * scale
+    return [draw.lam + 1e-12 * noise[0], draw.lam + 1e-3 * noise[1], noise[2], np.zeros_like(draw.lam)]
 
 
 def _check_solver(
     log: Log,
     data: Prepared,
-    given: tuple[ExactLoad, ...],
+    exact_loads: tuple[ExactLoad, ...],
     references: list[Reference],
     allowed: list[dict[str, tuple[float, float]]],
     variant: Variant,
@@ -149,7 +149,7 @@ def _check_solver(
     name, form, options = variant
     session = SolverSession(make_solver(name, options), problem_in(data, form), TOLERANCES[name])
     session.open(batched=True)
-    loads = session.problem.loads([each.load for each in given])
+    loads = session.problem.loads([each.load for each in exact_loads])
     answers = [session.next(load, session.nearest(load), k) for k, load in enumerate(loads)]
     if session.batch is not None:
         answers += session.solve_batch(loads)
@@ -161,10 +161,10 @@ def _check_solver(
         log.seen[f"{name} {form} {options or ''}".strip()] += 1
         (x,) = session.problem.recover([answer.lam], [answer.x], [loads[k]])
         limit = min(allowed[k][name]) if variant in USUAL else allowed[k][name][0]
-        error = _max_error(x, given[k].x)
+        error = _max_error(x, exact_loads[k].x)
         if not error <= Fraction(limit):
             log.fault("wrong but solved", f"{variant}: {float(error):.3e} mm off, allowed {limit:.3e} mm")
-        judged = judge(data, given[k].load, references[k], x, answer.lam, limit)
+        judged = judge(data, exact_loads[k].load, references[k], x, answer.lam, limit)
         if judged.verdict == "within" and error > Fraction(limit) + Fraction(references[k].bound_mm):
             log.fault("judged wrongly", f"{variant}: {float(error):.3e} mm off, limit {limit:.3e} mm")
         if judged.verdict == "outside" and error <= Fraction(limit) - Fraction(references[k].bound_mm):
@@ -174,21 +174,21 @@ def _check_solver(
 
 def _check_interface(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
     """As a user's own matrices, once as they are and once with a contact twice."""
-    assembly, each = made.assembly, made.loads[0]
+    assembly, draw = made.assembly, made.loads[0]
     K = sp.block_diag(assembly.K.matrices)
     try:
-        data = prepared(own_matrices(K, assembly.A, each.load.f, each.load.g))
-        known = best_of_candidates(data, each.load)
+        data = prepared(own_matrices(K, assembly.A, draw.load.f, draw.load.g))
+        reference = best_of_candidates(data, draw.load)
     except InputError:
         if made.ordinary:
             raise
         return
-    _bound(log, "own matrices", known.x, known.bound_mm, each.x)
+    _bound(log, "own matrices", reference.x, reference.bound_mm, draw.x)
     j = int(random.integers(assembly.m))
     twice = sp.hstack([assembly.A, assembly.A[:, [j]] * 2.0 ** random.integers(-3, 4)])
-    g = np.append(each.load.g, each.load.g[j])
+    g = np.append(draw.load.g, draw.load.g[j])
     with pytest.raises(InputError, match="depend"):
-        _ = prepared(own_matrices(K, twice, each.load.f, g)).Q
+        _ = prepared(own_matrices(K, twice, draw.load.f, g)).Q
 
 
 def test_a_dual_program_alone_is_solved_to_its_promise() -> None:

@@ -45,11 +45,11 @@ def certified(name: str) -> tuple[Vector, Vector]:
     return found.x, found.lam
 
 
-def rescaled(given: Prepared, case: LoadCase, S: Vector, C: Vector) -> tuple[Prepared, LoadCase]:
+def rescaled(original: Prepared, case: LoadCase, S: Vector, C: Vector) -> tuple[Prepared, LoadCase]:
     """In x' = x/S and λ' = λ/C."""
-    K = given.assembly.K
+    K = original.assembly.K
     blocks = [S[rows, None] * block * S[rows] for block, rows in zip(K.matrices, K.slices, strict=True)]
-    A = sp.csc_array(sp.diags_array(S) @ given.assembly.A @ sp.diags_array(C))
+    A = sp.csc_array(sp.diags_array(S) @ original.assembly.A @ sp.diags_array(C))
     return Prepared(Assembly(Stiffness.of(*blocks), A)), LoadCase(S * case.f, C * case.g)
 
 
@@ -79,43 +79,43 @@ def test_a_joint_in_mm_is_passed_on_untouched(form: Form) -> None:
 
 
 def test_a_model_in_other_units_and_back_is_the_same_to_the_last_bit() -> None:
-    given, load = opened("three-part-stack")
-    units = Units.of(given).of_loads([load])
-    problem, own = units.scaled(), units.load(load)
+    original, load = opened("three-part-stack")
+    units = Units.of(original).of_loads([load])
+    problem, inside = units.scaled(), units.load(load)
     D, R, U = units.D, units.R, units.U
     assert (np.frexp(np.concatenate([D, R, [U]]))[0] == 0.5).all()
     assert len(set(D)) > 3  # mixed units indeed
-    for K, mine, rows in zip(given.blocks, problem.blocks, given.assembly.K.slices, strict=True):
+    for K, mine, rows in zip(original.blocks, problem.blocks, original.assembly.K.slices, strict=True):
         assert abs(sp.diags_array(1 / D[rows]) @ mine @ sp.diags_array(1 / D[rows]) - K).max() == 0
     back = sp.diags_array(1 / D) @ problem.assembly.A @ sp.diags_array(1 / R)
-    assert abs(back - given.assembly.A).max() == 0
-    np.testing.assert_array_equal(U * own.f / D, load.f)
-    np.testing.assert_array_equal(U * own.g / R, load.g)
+    assert abs(back - original.assembly.A).max() == 0
+    np.testing.assert_array_equal(U * inside.f / D, load.f)
+    np.testing.assert_array_equal(U * inside.g / R, load.g)
     random = np.random.default_rng(0)
-    lam, x = random.random(given.assembly.m), random.random(given.assembly.n)
-    gap = load.g - given.assembly.A.T @ x
+    lam, x = random.random(original.assembly.m), random.random(original.assembly.n)
+    gap = load.g - original.assembly.A.T @ x
     scaled_lam, scaled_gap, scaled_x = units.start(lam, gap, x)
-    np.testing.assert_allclose(scaled_gap, own.g - problem.assembly.A.T @ scaled_x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(scaled_gap, inside.g - problem.assembly.A.T @ scaled_x, rtol=0, atol=1e-12)
     for one, other in zip(units.answer(scaled_lam, scaled_x), (lam, x), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_a_model_in_other_units_has_gaps_in_mm_and_the_factors_of_K() -> None:
-    given, load = opened("three-part-stack")
-    units = Units.of(given).of_loads([load])
+    original, load = opened("three-part-stack")
+    units = Units.of(original).of_loads([load])
     problem, own = units.scaled(), units.load(load)
     np.testing.assert_array_equal(own.g, load.g)
     assert units.length == 1.0
-    K, b = problem.assembly.K, np.random.default_rng(0).standard_normal(given.assembly.n)
+    K, b = problem.assembly.K, np.random.default_rng(0).standard_normal(original.assembly.n)
     assert np.median(K.diagonal) == pytest.approx(1, rel=1)
     x = K.solve(b)
     np.testing.assert_allclose(K.multiply(x), b, rtol=0, atol=1e-6)
     np.testing.assert_array_equal(K.matrix.diagonal(), K.diagonal)
     np.testing.assert_allclose(K.matrix @ x, K.multiply(x), rtol=0, atol=1e-6)
-    for one, other in zip(K.factors, given.assembly.K.factors, strict=True):
+    for one, other in zip(K.factors, original.assembly.K.factors, strict=True):
         assert one is other
     Q = K.compliance(problem.assembly.A)
-    expected = given.assembly.K.compliance(given.assembly.A) * units.R * units.R[:, None]
+    expected = original.assembly.K.compliance(original.assembly.A) * units.R * units.R[:, None]
     np.testing.assert_allclose(Q, expected, rtol=0, atol=1e-12 * Q.max())
 
 
@@ -156,12 +156,12 @@ def test_a_case_without_loads_and_gaps_has_the_unit_one() -> None:
 def test_the_duality_gap_may_have_as_many_newton_millimetres_as_the_tolerance_has_mm() -> None:
     given, load = opened("three-part-stack")
     units = Units.of(given).of_loads([load])
-    own = units.load(load)
-    assert own.energy == units.U**2 > 1
-    assert gap_tolerance(1e-6, own) == 1e-6 / units.U**2
-    assert gap_tolerance(1e-10, own) == 1e-13  # rounding
-    assert gap_tolerance(1e-300, own) == 1e-300  # asked for more than that
-    assert gap_tolerance(1e-9, replace(own, energy=1e-6)) == 1e-9
+    scaled_load = units.load(load)
+    assert scaled_load.energy == units.U**2 > 1
+    assert gap_tolerance(1e-6, scaled_load) == 1e-6 / units.U**2
+    assert gap_tolerance(1e-10, scaled_load) == 1e-13  # rounding
+    assert gap_tolerance(1e-300, scaled_load) == 1e-300  # asked for more than that
+    assert gap_tolerance(1e-9, replace(scaled_load, energy=1e-6)) == 1e-9
 
 
 # Answers.
@@ -188,11 +188,11 @@ def test_answers_do_not_depend_on_units(name: str, form: Form, bits: int) -> Non
         problem = problem_in(data, form)
         session = opened_session(name, problem, TOLERANCES.get(name, 1e-10))
         first, other = problem.loads([given, LoadCase(given.f, 1.0625 * given.g)])
-        found = [session.next(first, None), session.next(other, session.nearest(other))]
-        found.append(session.next(first, session.nearest(first)))
+        in_turn = [session.next(first, None), session.next(other, session.nearest(other))]
+        in_turn.append(session.next(first, session.nearest(first)))
         if session.batch is not None:
-            found += session.solve_batch([first, first])
-        answers.append(found)
+            in_turn += session.solve_batch([first, first])
+        answers.append(in_turn)
     rounded = bits > 0 or name == "proxqp"  # whose rounding depends on where its arrays lie in memory
     for one, two in zip(*answers, strict=True):
         assert one.status == two.status

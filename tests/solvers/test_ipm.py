@@ -185,13 +185,6 @@ def test_no_feasibility_is_asked_for_below_rounding(monkeypatch: pytest.MonkeyPa
     assert 1e-10 < answer.details["infeasibility"] < 1e-15 * size
 
 
-def test_a_start_that_cannot_be_made_is_a_failure_that_says_so() -> None:
-    answer = solved(-np.eye(4), np.ones(4), preconditioner="none")
-    assert answer.status == "failed"
-    assert answer.lam is None
-    assert "definite" in answer.details["cause"]
-
-
 def test_where_no_feasible_start_is_found_another_is_taken() -> None:
     """Two contacts that close each other's gap: Qλ > 0 only for λ₁ between 1.072 and 1.076 λ₂."""
     Q = np.array([[0.00464895, -0.00498223], [-0.00498223, 0.00536092]])
