@@ -1,7 +1,5 @@
 """The commands for exchange with other programs: export, import, judge."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """The command `explore`: a page on which fasteners move."""
 
-from __future__ import annotations
-
 import webbrowser
 from typing import Annotated
 

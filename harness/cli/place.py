@@ -1,7 +1,5 @@
 """The command `place`: where fasteners go."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The commands for a scene: init, validate, solve."""
 
-from __future__ import annotations
-
 import os
 import shlex
 from pathlib import Path

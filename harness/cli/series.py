@@ -1,7 +1,5 @@
 """The command `series`: many load cases on one assembly."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The commands for a suite: run, report, gate."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Annotated, Any

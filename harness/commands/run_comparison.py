@@ -1,7 +1,5 @@
 """Compares runs, measurement by measurement: what became worse?"""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Checks a solver on small problems with known answers; each fault is a finding in plain words."""
 
-from __future__ import annotations
-
 import math
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence

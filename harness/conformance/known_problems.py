@@ -4,8 +4,6 @@ Choose x, λ ≥ 0 and gaps y ≥ 0 with λᵢyᵢ = 0, put f = Kx + Aλ and g =
 then hold by construction, and the answer is unique because K is positive definite.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

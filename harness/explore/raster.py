@@ -1,7 +1,5 @@
 """Draws any layout of contacts as an image: each pixel shows the nearest contact."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +22,7 @@ class Raster:
     nearest: Indices
 
     @classmethod
-    def of(cls, places: Matrix) -> Raster:
+    def of(cls, places: Matrix) -> "Raster":
         """An image with a pixel per contact where the contacts form a full grid. places : (m, 2) mm."""
         extent = np.ptp(places, axis=0)
         mean = float(np.sqrt(extent.prod() / len(places))) or float(extent.max()) / len(places) or 1.0

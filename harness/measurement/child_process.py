@@ -3,8 +3,6 @@
 The call comes pickled through stdin; events go back as JSON lines on the file descriptor that it names.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import faulthandler

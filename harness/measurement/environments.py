@@ -4,8 +4,6 @@ Each is a virtual environment in the cache, made by venv and pip, whose path end
 site-packages: only the requested package and its dependencies are new.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import shutil
 import site

@@ -4,8 +4,6 @@ Whatever the process does (hang, crash, exhaust memory, fork, print without end)
 none of its processes survives.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -4,8 +4,6 @@ Each worker takes one task at a time, so that a measurement has its worker to it
 worker are done by others; a task that keeps killing workers fails alone. Only the driver writes results.
 """
 
-from __future__ import annotations
-
 import logging
 import platform
 import signal

@@ -5,8 +5,6 @@ event with `phase` (start, solve, save) starts the clock of another limit; one w
 measurement, or the current case of a series.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

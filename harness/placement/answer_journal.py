@@ -1,7 +1,5 @@
 """Answers to questions about plans, each kept in a file: an interrupted search finds them there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """The holes that fasteners may go into, and the scene without its fasteners."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,7 +36,7 @@ class MovableFasteners:
     current: Plan
 
     @classmethod
-    def of(cls, scene: Scene) -> MovableFasteners:
+    def of(cls, scene: Scene) -> "MovableFasteners":
         """Raises InputError as `movable_fasteners` does, and if two are at one place."""
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)

@@ -15,8 +15,6 @@ s = 1, N = K and c = 0: no number of cases shows that none fails, but the interv
 A table of measured gaps is finite: its odd rows are held back, and there is one round, r = 0.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -89,7 +87,7 @@ class Cases:
     table: bool = False
 
     @classmethod
-    def of(cls, count: int, table: bool, goal: Goal) -> Cases:
+    def of(cls, count: int, table: bool, goal: Goal) -> "Cases":
         """count : how many choose a plan; of a table, all its rows. Raises InputError if they are too few to
         show the share.
         """
@@ -118,7 +116,7 @@ class Sample:
     interval: tuple[float, float]
 
     @classmethod
-    def of(cls, plan: Plan, search: Search, goal: Goal, cases: Cases, fresh: slice, alpha: float) -> Sample:
+    def of(cls, plan: Plan, search: Search, goal: Goal, cases: Cases, fresh: slice, alpha: float) -> "Sample":
         """fresh : which of the cases' numbers."""
         from scipy.stats import binomtest
 

@@ -4,8 +4,6 @@ The plan found and the scene's own plan are then solved as series of load cases,
 DIRECTORY/own, on the scenes as a user would read them.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from contextlib import nullcontext

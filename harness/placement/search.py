@@ -21,8 +21,6 @@ each of them if FEW fasteners or less are asked for. If there are at most PLANS 
 fasteners, all of them are compared instead.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -99,7 +97,7 @@ class Search:
         """G, mm, in the cases of the outcome."""
         return sorted(outcome.largest, reverse=True)[self.allowed]
 
-    def among(self, numbers: Sequence[int], allowed: int) -> Search:
+    def among(self, numbers: Sequence[int], allowed: int) -> "Search":
         """The search among the load cases of these numbers, which are its cases 0, 1, …"""
 
         def ask(questions: Sequence[Question]) -> list[list[Outcome]]:

@@ -1,7 +1,5 @@
 """What is recorded of a search for a plan of fasteners: its identity, its outcome, and a sentence on it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any

@@ -8,8 +8,6 @@ so that a plan costs no more than its contact problems. Active-set Newton solves
 another plan in the same load case: most contacts have the same state.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache

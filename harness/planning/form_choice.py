@@ -8,8 +8,6 @@ The form is the sparse one, unless the solver takes dense forms only, Q is in th
 are small for the number of load cases that share them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log2

@@ -1,7 +1,5 @@
 """Changes a suite as the command line says."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Sequence

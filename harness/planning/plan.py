@@ -1,7 +1,5 @@
 """From a suite to the list of measurements, in the order of execution."""
 
-from __future__ import annotations
-
 import json
 import random
 import re

@@ -8,8 +8,6 @@ name = "ipm"
 forms = ["dual"]
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase

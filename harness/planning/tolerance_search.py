@@ -5,8 +5,6 @@ the scene. repeats = "auto" repeats what is quick. stop_at_times_fastest = k sto
 as the fastest other library, and does not run what was stopped on two scenes of a size on the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf

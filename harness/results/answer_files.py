@@ -1,7 +1,5 @@
 """The answers of a results directory: answers/NAME.npz, or the members of one answers.zip."""
 
-from __future__ import annotations
-
 import io
 import shutil
 import zipfile

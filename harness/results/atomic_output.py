@@ -1,7 +1,5 @@
 """Writes outputs beside their place and moves them there when they are whole."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence

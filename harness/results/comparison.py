@@ -8,8 +8,6 @@ bound is the error bound of the reference: below it, a difference says nothing a
 a difference between errors a million times below the limit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isclose, log10

@@ -1,7 +1,5 @@
 """The origin of a row: the machine, its memory and versions; the commit of the code, and its changes."""
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess

@@ -4,8 +4,6 @@ A row is one JSON line in measurements.jsonl, appended and synced before the nex
 abrupt end can only leave a torn last line, which the next run removes.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Checks the rows of a file on reading: a file may hold anything."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ A row of measurements.jsonl is one measurement. The harness writes its fields an
 take the names from here. A field that does not apply to a measurement is null.
 """
 
-from __future__ import annotations
-
 from types import NoneType
 from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 

@@ -8,8 +8,6 @@
 Cases are written in transactions: whatever ends the process, a case has its row and its gaps, or neither.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import sqlite3

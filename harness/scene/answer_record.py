@@ -6,8 +6,6 @@ installed fastener is a spring of stiffness k along t = w_a − w_b, set at the 
 together with k (a − tᵀx), N, and pushes them apart where that is negative.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from itertools import product, repeat

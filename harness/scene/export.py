@@ -11,8 +11,6 @@ written as a folder of Matrix Market files, one per array and with 17 digits, or
 the texts in the .npz, name the problem.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Judges an answer that another program has computed: x or λ from a .npz or .csv file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import inf
 from pathlib import Path

@@ -15,8 +15,6 @@ first on four; the tenth is a sheet over a former, whose contact ends at one nod
 is that of the answer, interpolated. All meshes are solved in the sparse form.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Writes a scene's file with other values for another folder; its comments and order are kept."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path

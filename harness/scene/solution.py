@@ -1,7 +1,5 @@
 """Solves a scene step by step: a judged answer with a proven bound, for the command and for Python."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

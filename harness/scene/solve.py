@@ -3,8 +3,6 @@
 DIR is written beside its place and moved there when it is whole; what an older answer left is removed.
 """
 
-from __future__ import annotations
-
 import time
 from math import inf
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Two scenes on one junction, such as two plans of fasteners, solved and compared contact by contact."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Checks a scene without solving it: its parts and effects, its size and memory, the digits of a given K."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -4,8 +4,6 @@ A plug-in is under limits as in a measurement. A case that ends its process or e
 says so; those before it are kept, those after it are left for another run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager

@@ -1,7 +1,5 @@
 """Where the load cases of `series` and `place` come from: random gaps, or measured ones."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain

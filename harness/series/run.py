@@ -3,8 +3,6 @@
 The same command resumes the series that a directory holds; another series is refused.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path

@@ -2,8 +2,6 @@
 each case from the nearest of the answers so far.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 No other code calls the steps of solvers.base.
 """
 
-from __future__ import annotations
-
 import os
 from collections import deque
 from collections.abc import Iterator, Sequence

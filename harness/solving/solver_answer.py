@@ -1,7 +1,5 @@
 """A solver's answer: whether it is valid, its figures for the row, its file; files that it may not change."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable
 from numbers import Integral, Real

@@ -2,8 +2,6 @@
 run: each row as it is finished, above a progress bar.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -193,7 +191,7 @@ class Display(Reporter):
         self.task: TaskID = self.bar.add_task("", total=remaining + done, completed=done)
         self.heading = ""
 
-    def __enter__(self) -> Display:
+    def __enter__(self) -> "Display":
         self.console.print(_line([heading for heading, *_ in COLUMNS]), style="bold", soft_wrap=True)
         self.bar.start()
         return self

@@ -14,8 +14,6 @@ The error E_j returned is above that: with γ_{k+2}, whose further rounding is t
 comparison with a limit, |fl(ŷ ± E) − (ŷ ± E)| ≤ u(|ŷ| + E), and a factor for the rounding of E itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -96,7 +94,7 @@ class GapError:
     underflow: Vector
 
     @classmethod
-    def of(cls, assembly: Assembly) -> GapError:
+    def of(cls, assembly: Assembly) -> "GapError":
         k = np.diff(assembly.A.indptr)
         norms = np.asarray(abs(assembly.at_junction(assembly.A)).sum(axis=0)).ravel()
         return cls(norms, abs(assembly.A).T, gamma(k + 2), (k + 2) * ETA)

@@ -12,8 +12,6 @@ the backward error of that factorisation, whatever the factor of K (Rump, BIT 46
 with η = 2⁻¹⁰⁷⁴, is within the last 1 % of the margin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -46,7 +44,7 @@ class Balanced:
     At: sp.csr_array
 
     @classmethod
-    def of(cls, prepared: Prepared) -> Balanced:
+    def of(cls, prepared: Prepared) -> "Balanced":
         assembly = prepared.assembly
         D = assembly.K.units
         A = sp.csc_array(sp.diags_array(D) @ assembly.A)

@@ -1,7 +1,5 @@
 """Makes the gaps of closed contacts zero: Q_CC dλ = −y_C by an approximate inverse M ≈ Q⁻¹."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -23,7 +21,7 @@ class ScaledInverse:
     R: Vector
 
     @classmethod
-    def of(cls, prepared: Prepared, R: Vector) -> ScaledInverse:
+    def of(cls, prepared: Prepared, R: Vector) -> "ScaledInverse":
         with suppress(np.linalg.LinAlgError):  # Q is not positive definite, but for rounding
             if len(R):
                 plain = prepared.approximate_inverse

@@ -14,8 +14,6 @@ A product that underflows is off by η = 2⁻¹⁰⁷⁴ at most; additions are 
 infinity or NaN, which bounds nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -43,15 +41,15 @@ class DoubleDouble:
     hi: Matrix
     lo: Matrix
 
-    def plus(self, correction: Matrix) -> DoubleDouble:
+    def plus(self, correction: Matrix) -> "DoubleDouble":
         hi, error = two_sum(self.hi, correction)
         return DoubleDouble(*two_sum(hi, error + self.lo))
 
-    def scaled(self, units: Vector) -> DoubleDouble:
+    def scaled(self, units: Vector) -> "DoubleDouble":
         """The sum times powers of two (n,), without rounding."""
         return DoubleDouble(units * self.hi, units * self.lo)
 
-    def __getitem__(self, place: Any) -> DoubleDouble:
+    def __getitem__(self, place: Any) -> "DoubleDouble":
         return DoubleDouble(self.hi[place], self.lo[place])
 
 
@@ -62,7 +60,7 @@ class Enclosure:
     value: Matrix
     error: Matrix
 
-    def __getitem__(self, place: Any) -> Enclosure:
+    def __getitem__(self, place: Any) -> "Enclosure":
         return Enclosure(self.value[place], self.error[place])
 
 

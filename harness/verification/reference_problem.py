@@ -1,7 +1,5 @@
 """A scene with its matrices and its reference, on which answers are judged; its row in problems.jsonl."""
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -77,7 +75,7 @@ class ReferenceProblem:
         largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
         return conditioned_limit(usual_mm, data.condition, largest)
 
-    def of_case(self, series: dict[str, Any] | None, case: int | None) -> ReferenceProblem:
+    def of_case(self, series: dict[str, Any] | None, case: int | None) -> "ReferenceProblem":
         """The problem of a load case of a series, with a reference of its own."""
         if series is None or case is None:
             return self

@@ -8,8 +8,6 @@ The total of k load cases is that of the first, from the scene on, and k − 1 t
 Matrices that came from the cache count with the seconds that it took to make them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

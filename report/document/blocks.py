@@ -1,7 +1,5 @@
 """Sections of a report, and their blocks: text, tables and figures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar

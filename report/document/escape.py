@@ -5,8 +5,6 @@ CSV or mathematical text become private ones (U+E000 …), which pass through se
 Whoever writes a file spells them out for it: `markdown`, `script_json`, `csv_cell`, `picture`, `file_name`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Numbers as text: three significant digits, '–' if there is none."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

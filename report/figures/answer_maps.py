@@ -1,7 +1,5 @@
 """Maps of answers: gaps, contact forces and displacements of one scene, and the gaps of two."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

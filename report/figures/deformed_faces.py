@@ -1,7 +1,5 @@
 """The faces of the parts around the largest gap of an answer, seen obliquely, their distance exaggerated."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A section through the largest gap of an answer: the faces of the two parts, before and after."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -5,8 +5,6 @@ sheet are known in advance: a layout engine would draw every label several times
 longer than the picture.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

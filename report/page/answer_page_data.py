@@ -1,7 +1,5 @@
 """Collects what the page of an answer, or of two answers on one junction, shows."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from report.document.numbers import listed, out_of, position, significant

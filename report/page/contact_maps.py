@@ -5,8 +5,6 @@ fasteners. A field has packed `values`, and a `kind` and a range for its colours
 mm: x, y, and left, right, bottom and top of each contact's cell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

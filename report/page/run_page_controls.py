@@ -1,7 +1,5 @@
 """The lists and the slider above the views of a results directory."""
 
-from __future__ import annotations
-
 import math
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """The answer of one scene: its record and arrays, and tables of its nodes, contacts and fasteners."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

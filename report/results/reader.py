@@ -4,8 +4,6 @@
 with the repeats merged.
 """
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Callable
@@ -77,7 +75,7 @@ class Results:
             return {}
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 
-    def about(self, what: str) -> Results:
+    def about(self, what: str) -> "Results":
         """The results on rungs of "ladders", on scenes "drawn" at random, on all "scenes" that are shown
         one by one, or "all".
         """
@@ -88,7 +86,7 @@ class Results:
         rows = self.rows if what == "all" else self.rows[own.get(what, others)].reset_index(drop=True)
         return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 
-    def by_machine(self) -> list[Results]:
+    def by_machine(self) -> list["Results"]:
         """The results of each machine, so that no table or mean can mix two of them."""
         names = self.rows["machine"].unique()
         if len(names) < 2:

@@ -5,8 +5,6 @@ figures per case. Quantiles are exact (numpy's, linear between order statistics)
 the gaps to float32, 6e-8 of their size.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass

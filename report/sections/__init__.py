@@ -5,8 +5,6 @@ for it. To add one, write the function and name it here, after the results that 
 rungs of ladders, on scenes drawn at random, on all other scenes, or all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

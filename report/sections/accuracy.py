@@ -1,7 +1,5 @@
 """Accuracy: what it costs, and whose tolerance can be trusted."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pandas as pd

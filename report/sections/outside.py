@@ -1,7 +1,5 @@
 """Problems from outside: the optimum beside what its source prints, and its convergence under refinement."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """Scenes drawn at random: every solve time, worst cases beside medians, failures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pandas as pd

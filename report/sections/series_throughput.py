@@ -1,7 +1,5 @@
 """Series: load cases per second and their errors by solver, also relative to the fastest library."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from harness.results.schema import ANSWERED

@@ -1,7 +1,5 @@
 """Time of each method against contacts and size, products with Q by scene, and the speed of the machine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

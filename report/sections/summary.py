@@ -1,7 +1,5 @@
 """Which solver to use, and the standing of every solver."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """How fast is it, from the scene on? Against libraries and textbook methods, and stage by stage."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any

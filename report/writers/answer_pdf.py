@@ -1,7 +1,5 @@
 """Writes an answer on one A4 page: verdict, pictures, error bound, origin."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from textwrap import wrap
 from typing import Any

@@ -1,7 +1,5 @@
 """Writes what changed between runs: comparison.md, comparison.csv with every measurement."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """The files on the contacts of a series whose gap is larger than allowed: a table and a map."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """Writes the report of a search for a plan of fasteners: report.md with pictures, and plan.csv, order.csv."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

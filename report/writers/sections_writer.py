@@ -1,7 +1,5 @@
 """Writes every report: Markdown from sections, with a PNG per figure and a CSV per table beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType

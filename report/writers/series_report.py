@@ -1,7 +1,5 @@
 """Writes the report of a series: report.md, PNG and CSV, and a page in HTML with the maps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Writes the report of a results directory: Markdown with pictures and tables, and a page in HTML."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable

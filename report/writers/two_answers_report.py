@@ -1,7 +1,5 @@
 """Writes two answers on one junction: comparison.md, maps, tables of contacts and fasteners, index.html."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
