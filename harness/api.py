@@ -14,8 +14,6 @@ InputError. Matrices are cached as by the command line. Arrays are copied, and t
 (solving/call_lock.py).
 """
 
-from __future__ import annotations
-
 from harness.commands import load_case_series, plain_arrays, run_comparison, suite_runs
 from harness.commands.load_case_series import SeriesOptions, SeriesOutcome
 from harness.commands.suite_runs import SuiteOutcome

@@ -1,7 +1,5 @@
 """The tables of `list`: solvers, scenes, suites, file formats."""
 
-from __future__ import annotations
-
 from rich.table import Table
 
 from harness.planning.suite import read_suite, suite_names

@@ -1,7 +1,5 @@
 """Solves many load cases on one assembly into a directory, which keeps rows, gaps, report and verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf

@@ -1,7 +1,5 @@
 """Problems and answers as arrays: your own matrices, an x judged, one dual problem, a series in memory."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice

@@ -1,7 +1,5 @@
 """Measures a suite into a directory, and reports on a directory again."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

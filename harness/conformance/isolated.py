@@ -1,7 +1,5 @@
 """Checks a solver in a process of its own, so that to hang, to crash or to eat memory is a finding, too."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path

@@ -4,8 +4,6 @@ The settings change effects of the scene: places and preload of its fasteners, t
 initial gap. The forces and gaps of an effect are kept as long as it stays the same.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -60,7 +58,7 @@ class Settings:
     pressures: tuple[float, ...]
 
     @classmethod
-    def of(cls, scene: Scene) -> Settings:
+    def of(cls, scene: Scene) -> "Settings":
         """The settings of a scene. Raises InputError if it has no fasteners that can move."""
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)

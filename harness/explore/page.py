@@ -4,8 +4,6 @@ Bokeh's server calls `changed` when a fastener is let go or a slider stops; the 
 proven right after. If the settings on the page are wrong, the last answer stays, in grey.
 """
 
-from __future__ import annotations
-
 import secrets
 import shlex
 import tomllib

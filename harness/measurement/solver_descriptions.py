@@ -4,8 +4,6 @@ Libraries and plug-ins are imported in a process of their own, so that one that 
 no harm; the project's own methods are imported here. A row holds for the same scene, solver and accuracy.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -1,7 +1,5 @@
 """Runs a suite: scene by scene, one worker process and one row per measurement, resumable at any point."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """One task: measurements made by one process, here or on a worker of a scheduler, and their rows."""
 
-from __future__ import annotations
-
 import tempfile
 import time
 from dataclasses import asdict, dataclass, replace
