@@ -50,11 +50,11 @@ def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_exceeding(allowed: float, uncertainty: float, exceeded: bool | None, contacts: list[int]) -> None:
     gap = np.array([0.0, 0.1, 0.3, -1e-12])
-    found = checked(allowed, gap, np.full(4, uncertainty), PAIRS)
-    assert found["exceeded"] is exceeded
-    assert found["contacts"] == contacts
-    assert found["share"] == len(contacts) / 4
-    assert found["pairs"] == {1: ["b – tool"], 2: ["a – b", "b – tool"]}.get(len(contacts), [])
+    check = checked(allowed, gap, np.full(4, uncertainty), PAIRS)
+    assert check["exceeded"] is exceeded
+    assert check["contacts"] == contacts
+    assert check["share"] == len(contacts) / 4
+    assert check["pairs"] == {1: ["b – tool"], 2: ["a – b", "b – tool"]}.get(len(contacts), [])
 
 
 @dataclass
@@ -160,8 +160,8 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     gaps = np.array([load.g - data.assembly.A.T @ solve_by_nnls(data, load)[0] for load in loads])
     allowed = between(gaps.max(axis=1), 5)
     larger = gaps > allowed
-    asked: tuple[Any, ...] = ("series", path, "--cases", CASES, "--seed", 3, "--check", 0, "--threads", 1)
-    done = harness(*asked, "--allow-gap", allowed, "--out", tmp_path)
+    command: tuple[Any, ...] = ("series", path, "--cases", CASES, "--seed", 3, "--check", 0, "--threads", 1)
+    done = harness(*command, "--allow-gap", allowed, "--out", tmp_path)
     assert done.exit_code == 4, done.output
     assert f"in 5 of {CASES} cases" in done.stdout
     low, high = beta.ppf(0.025, CASES - 5, 6), beta.ppf(0.975, CASES - 4, 5)
@@ -175,13 +175,13 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     with (tmp_path / "allowed-gap.csv").open() as file:
         table = list(csv.DictReader(file))
     np.testing.assert_allclose([float(line["share_of_cases"]) for line in table], larger.mean(axis=0))
-    again = harness(*asked, "--allow-gap", 9.0, "--out", tmp_path)
+    again = harness(*command, "--allow-gap", 9.0, "--out", tmp_path)
     assert (again.exit_code, "PASS: in none of 12 cases" in again.stdout) == (0, True)
-    assert harness(*asked, "--out", tmp_path).exit_code == 0
+    assert harness(*command, "--out", tmp_path).exit_code == 0
     assert "PASS" not in (tmp_path / "report" / "report.md").read_text()
-    unknown = harness(*asked, "--allow-gap", 1e-16, "--out", tmp_path)
+    unknown = harness(*command, "--allow-gap", 1e-16, "--out", tmp_path)
     assert (unknown.exit_code, "In 12 of 12 cases it cannot be told" in unknown.stdout) == (3, True)
-    unjudged = harness(*asked, "--limit", 1e-30, "--allow-gap", allowed, "--out", tmp_path / "unjudged")
+    unjudged = harness(*command, "--limit", 1e-30, "--allow-gap", allowed, "--out", tmp_path / "unjudged")
     assert (unjudged.exit_code, f"{CASES} cannot be judged" in unjudged.stdout) == (4, True)
 
 
@@ -193,10 +193,10 @@ def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: 
 
 
 def test_a_series_without_errors_of_gaps_cannot_be_told(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
-    asked = ("series", gap[0], "--cases", 3, "--check", 0, "--threads", 1, "--out", tmp_path)
-    assert harness(*asked).exit_code == 0
+    command = ("series", gap[0], "--cases", 3, "--check", 0, "--threads", 1, "--out", tmp_path)
+    assert harness(*command).exit_code == 0
     rows = list(series_file.rows(tmp_path))
     assert all(row["gap_error_mm"] >= row["bound_mm"] for row in rows)
     with series_file.connected(tmp_path) as connection:
         connection.execute("UPDATE cases SET row = json_remove(row, '$.gap_error_mm')")
-    assert harness(*asked, "--allow-gap", 9.0).exit_code == 3
+    assert harness(*command, "--allow-gap", 9.0).exit_code == 3

@@ -84,15 +84,15 @@ def test_all_that_is_wrong_is_said_at_once() -> None:
 
 def test_the_gate_makes_plain_types_that_nobody_can_change() -> None:
     lam = np.ones(1, dtype=np.float32)
-    given = Answer("solved", lam, [1, 2], np.int32(3), None, np.float32(0.5), {"a": np.ones(2)})  # type: ignore[arg-type]
-    found = checked(given, smallest())
-    assert [found.lam.dtype, found.x.dtype] == [np.float64] * 2
-    assert [type(found.iterations), type(found.reported_s), found.details] == [int, float, {"a": [1.0, 1.0]}]
+    answer = Answer("solved", lam, [1, 2], np.int32(3), None, np.float32(0.5), {"a": np.ones(2)})  # type: ignore[arg-type]
+    plain = checked(answer, smallest())
+    assert [plain.lam.dtype, plain.x.dtype] == [np.float64] * 2
+    assert [type(plain.iterations), type(plain.reported_s), plain.details] == [int, float, {"a": [1.0, 1.0]}]
     lam[:] = 7
-    assert found.lam == [1]
+    assert plain.lam == [1]
     with pytest.raises(ValueError, match="read-only"):
-        found.lam[0] = 7
-    large = checked(replace(given, details={"a": "x" * LARGEST_DETAILS}), smallest())
+        plain.lam[0] = 7
+    large = checked(replace(answer, details={"a": "x" * LARGEST_DETAILS}), smallest())
     assert large.details.keys() == {"dropped"}
 
 

@@ -77,18 +77,18 @@ def test_solutions_are_the_independent_answer(solver: str | None, form: Any) -> 
         with pytest.raises(InputError, match="newton: form = 'primal': it takes dual"):
             solve(own_matrices(*matrices()[2]), solver, form=form)
         return
-    data, load, own = matrices()
+    data, load, arrays = matrices()
     x, lam = solve_by_nnls(data, load)
-    found = solve(own_matrices(*own), solver, form=form, tolerance=1e-10)
-    assert own[2].flags.writeable
-    assert found.status == "solved"
-    assert found.judgement.verdict == "within"
-    np.testing.assert_allclose(found.x, x, atol=1e-9)
-    np.testing.assert_allclose(found.lam, lam, atol=1e-5)
-    np.testing.assert_allclose(found.gap, load.g - data.assembly.A.T @ x, atol=1e-9)
-    assert abs(found.x - x).max() <= found.error_bound_mm + 1e-11
-    assert (found.iterations is None) == (solver is None)
-    assert 0 < found.error_bound_mm < (1e-11 if solver is None else 1e-7)
+    solution = solve(own_matrices(*arrays), solver, form=form, tolerance=1e-10)
+    assert arrays[2].flags.writeable
+    assert solution.status == "solved"
+    assert solution.judgement.verdict == "within"
+    np.testing.assert_allclose(solution.x, x, atol=1e-9)
+    np.testing.assert_allclose(solution.lam, lam, atol=1e-5)
+    np.testing.assert_allclose(solution.gap, load.g - data.assembly.A.T @ x, atol=1e-9)
+    assert abs(solution.x - x).max() <= solution.error_bound_mm + 1e-11
+    assert (solution.iterations is None) == (solver is None)
+    assert 0 < solution.error_bound_mm < (1e-11 if solver is None else 1e-7)
 
 
 def test_an_x_from_elsewhere_is_judged() -> None:
@@ -156,29 +156,29 @@ def test_a_solver_object_is_judged_and_its_nonsense_named() -> None:
 
 @pytest.mark.parametrize(("solver", "form"), [("newton", "dual"), ("gi", "dual"), ("gi", "primal")])
 def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
-    data, _, own = matrices()
+    data, _, arrays = matrices()
     loads = [make_load(seed, data)[0] for seed in range(4)]
-    found = list(solve_series(own_matrices(*own), loads, solver, form=form, check=2))
-    assert [result.row["case"] for result in found] == [0, 1, 2, 3]
-    for load, result in zip(loads, found, strict=True):
+    results = list(solve_series(own_matrices(*arrays), loads, solver, form=form, check=2))
+    assert [result.row["case"] for result in results] == [0, 1, 2, 3]
+    for load, result in zip(loads, results, strict=True):
         x, _ = solve_by_nnls(data, load)
         assert result.row["verdict"] == "within"
         assert ("displacement_error_mm" in result.row) == (result.row["case"] % 2 == 0)
         np.testing.assert_allclose(result.gap, load.g - data.assembly.A.T @ x, atol=1e-6)
     assert all(array.flags.writeable for load in loads for array in (load.f, load.g))
     with pytest.raises(InputError, match=r"case 1: g\.shape"):
-        solve_series(own_matrices(*own), [loads[0], LoadCase(loads[1].f, loads[1].g[1:])])
+        solve_series(own_matrices(*arrays), [loads[0], LoadCase(loads[1].f, loads[1].g[1:])])
 
 
 def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load_scene(tomllib.loads(STRIP))
-    gaps = [found.gap for found in solve_series(scene, random_gaps(scene, 2, seed=5))]
+    gaps = [results.gap for results in solve_series(scene, random_gaps(scene, 2, seed=5))]
     load = load_case(scene, "sparse")
     x = reference_of(scene, prepared(scene, form="sparse"), load).x
     monkeypatch.setattr(JointModel, "dense", lambda *given: pytest.fail("condensed"))
     cases = random_gaps(scene, 2, seed=5, form="sparse")
-    found = list(solve_series(scene, cases, form="sparse"))
-    assert [result.row["verdict"] for result in found] == ["within"] * 2
-    np.testing.assert_allclose([result.gap for result in found], gaps, atol=1e-7)
+    results = list(solve_series(scene, cases, form="sparse"))
+    assert [result.row["verdict"] for result in results] == ["within"] * 2
+    np.testing.assert_allclose([result.gap for result in results], gaps, atol=1e-7)
     assert judge(scene, x, form="sparse").verdict == "within"
     assert judge(scene, x + 1e-6, form="sparse").verdict == "outside"

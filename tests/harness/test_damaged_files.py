@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from commands import harness
 from strip_scene import write_strip
-from suite_runs import changed, rows_of
+from suite_runs import changed
 from typer.testing import Result
 
 from harness.measurement.suite_run import record_machine
@@ -163,25 +163,6 @@ def test_fewer_cases_are_reported_as_that_many(series: Path, monkeypatch: pytest
     series_file.write_fact(series, "series", json.dumps(facts | {"cases": 4}))
     assert harness("report", series).exit_code == 0
     assert re.search(r"solved +\| 4 of 4 cases", (series / "report" / "report.md").read_text())
-
-
-WRONG: list[tuple[str, Any]] = [
-    *(("limit_mm", value) for value in ("a", -1.0, True)),
-    *((name, 3) for name in ("key", "status", "answer", "scene")),
-    *(("gated", 1), ("series", {"cases": "a"}), ("case", "a"), ("solve_s", [1, 2])),
-]
-
-
-@pytest.mark.parametrize(("name", "value"), WRONG)
-def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, copy: Path) -> None:
-    rows = rows_of(copy)
-    rows[1][name] = value
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    for command in ("gate", "report"):
-        done = harness(command, copy)
-        if done.exit_code != 0 or command == "gate":
-            assert done.exit_code == 2, done.output
-            assert f"measurements.jsonl: line 2: {name}" in done.output
 
 
 @pytest.mark.parametrize(("name", "value"), [("key", None), ("time_limit_s", "a")])

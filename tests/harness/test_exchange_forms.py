@@ -45,19 +45,19 @@ def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Pa
     source = scenes / "strip.toml"
     done = harness("export", source, "--form", form, "--with-reference", "--out", tmp_path / "p")
     assert done.exit_code == 0, done.output
-    found = read_problem(tmp_path / "p")
+    files = read_problem(tmp_path / "p")
     problem = in_form(prepared(read_scene(str(source)), form=form), form)
     (load,) = problem.loads([load_case(read_scene(str(source)), form)])
-    assert np.array_equal(dense(found["P"]), dense(sp.block_diag(problem.blocks)))
-    assert np.array_equal(found["q"], problem.q(load))
+    assert np.array_equal(dense(files["P"]), dense(sp.block_diag(problem.blocks)))
+    assert np.array_equal(files["q"], problem.q(load))
     if form == "dual":
-        assert np.array_equal(found["lb"], np.zeros(45))
-        assert "G" not in found
+        assert np.array_equal(files["lb"], np.zeros(45))
+        assert "G" not in files
     else:
-        assert np.array_equal(dense(found["G"]), dense(problem.G))
-        assert np.array_equal(found["h"], problem.h(load))
-    assert float(found["limit_mm"][0]) == 1e-7
-    assert 0 < float(found["bound_mm"][0]) < 1e-9
+        assert np.array_equal(dense(files["G"]), dense(problem.G))
+        assert np.array_equal(files["h"], problem.h(load))
+    assert float(files["limit_mm"][0]) == 1e-7
+    assert 0 < float(files["bound_mm"][0]) < 1e-9
 
 
 def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_one_npz_holds_the_same(form: Form, scenes: Path, tmp_path: Path) -> Non
     asked = ("export", scenes / "strip.toml", "--form", form, "--with-reference", "--out")
     assert harness(*asked, tmp_path / "p").exit_code == 0
     assert harness(*asked, tmp_path / "p.npz").exit_code == 0
-    found = read_problem(tmp_path / "p")
+    files = read_problem(tmp_path / "p")
     with np.load(tmp_path / "p.npz") as archive:
         arrays = dict(archive)
     if form == "sparse":
@@ -86,7 +86,7 @@ def test_one_npz_holds_the_same(form: Form, scenes: Path, tmp_path: Path) -> Non
             parts = [arrays.pop(f"{name}_{part}") for part in ("data", "indices", "indptr", "shape")]
             arrays[name] = sp.csc_array(tuple(parts[:3]), shape=tuple(parts[3])).toarray()
     assert str(arrays["scene"]) == "strip"
-    for name, M in found.items():
+    for name, M in files.items():
         assert np.array_equal(arrays[name], dense(M)), name
 
 

@@ -59,12 +59,12 @@ def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Pat
             break
         saved = tmp_path / f"{k}.toml"
         saved.write_text(edited(str(path), tmp_path, settings.write_to, CHANGED))
-        known = solve(str(saved), form=form)
+        solution = solve(str(saved), form=form)
         assert answer.error_mm is not None
-        assert abs(answer.gap - known.gap).max() <= answer.error_mm + 1e-7
+        assert abs(answer.gap - solution.gap).max() <= answer.error_mm + 1e-7
         assert answer.error_mm <= 1e-6
         assert Settings.of(scene_of(saved)) == settings
-        np.testing.assert_allclose(answer.load.f, known.problem.load.f, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(answer.load.f, solution.problem.load.f, rtol=1e-12, atol=1e-12)
     assert answer.gap.max() > 0.05  # with no fastener left
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from commands import harness
 
 from harness.planning import form_choice
 from harness.planning.form_choice import chosen_form, refuse_what_cannot_fit, size_of
@@ -49,21 +48,6 @@ def test_the_stored_matrices_of_the_dense_forms_are_known_before_they_are_made()
 def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (form_choice, validate):
         monkeypatch.setattr(module, "physical_memory_mib", lambda: mib)
-
-
-@pytest.mark.parametrize(
-    ("scene", "form"), [("scaling/100352", "sparse"), ("4386/0107", "sparse"), ("scaling/1170", "dual")]
-)
-def test_validate_says_what_both_forms_take(scene: str, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    machine_of(24_000, monkeypatch)
-    done = harness("validate", scene)
-    said = " ".join(done.output.split())
-    assert done.exit_code == 0
-    assert "Dense forms: K, its factors and Q take" in said
-    assert f"One load case is solved in the {form} form" in said
-    if scene == "scaling/100352":
-        assert "the process up to 134606 MiB" in said
-        assert "634880 unknowns, half-bandwidth 395" in said
 
 
 @pytest.mark.parametrize("form", ["dual", "primal", "sparse"])

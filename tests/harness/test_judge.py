@@ -31,27 +31,27 @@ def test_the_exact_answer() -> None:
 
 
 def test_an_answer_without_contact() -> None:
-    found = judged(np.array([1.5, -0.5]), np.array([0.0]))
-    assert found.verdict == "outside"
-    assert found.displacement_error_mm == 0.75
-    assert found.min_gap_mm == -1.5
-    assert found.primal_residual == 1.5
-    assert found.dual_residual == 0.0
-    assert found.duality_gap == 0.0  # xᵀKx − fᵀx = 5 − 5
-    assert found.contact_mismatch == 0  # overlapping is closed
+    judgement = judged(np.array([1.5, -0.5]), np.array([0.0]))
+    assert judgement.verdict == "outside"
+    assert judgement.displacement_error_mm == 0.75
+    assert judgement.min_gap_mm == -1.5
+    assert judgement.primal_residual == 1.5
+    assert judgement.dual_residual == 0.0
+    assert judgement.duality_gap == 0.0  # xᵀKx − fᵀx = 5 − 5
+    assert judgement.contact_mismatch == 0  # overlapping is closed
     # F = 2·1.5 + 3 + 1·0 = 6 N and G = 2·1.5 + 0.5 = 3.5 mm: the overlap of 1.5 mm is what is left.
-    assert found.backward_error == pytest.approx(1.5 / 3.5)
+    assert judgement.backward_error == pytest.approx(1.5 / 3.5)
 
 
 def test_an_answer_that_stays_open_with_a_pulling_force() -> None:
-    found = judged(np.array([0.7, 0.3]), np.array([-0.25]))
-    assert found.contact_mismatch == 1
-    assert found.min_gap_mm == pytest.approx(0.1)
-    assert found.primal_residual == 0.0
-    assert found.dual_residual == pytest.approx(1.85)  # |1.4 − 3 − 0.25|, above max(0, −λ) = 0.25
-    assert found.duality_gap == pytest.approx(abs(2 * 0.58 - 1.8 - 0.125))
+    judgement = judged(np.array([0.7, 0.3]), np.array([-0.25]))
+    assert judgement.contact_mismatch == 1
+    assert judgement.min_gap_mm == pytest.approx(0.1)
+    assert judgement.primal_residual == 0.0
+    assert judgement.dual_residual == pytest.approx(1.85)  # |1.4 − 3 − 0.25|, above max(0, −λ) = 0.25
+    assert judgement.duality_gap == pytest.approx(abs(2 * 0.58 - 1.8 - 0.125))
     # F = 2·0.7 + 3 + 1·0.25 = 4.65 N: 1.85 N are out of balance.
-    assert found.backward_error == pytest.approx(1.85 / 4.65)
+    assert judgement.backward_error == pytest.approx(1.85 / 4.65)
 
 
 def test_a_pulling_force_in_balance_is_a_residual() -> None:

@@ -114,8 +114,6 @@ def test_what_an_answer_needed_from_the_scene_on(folder: Path, solver: str, form
     ("fault", "status", "message"),
     [
         ("signal", "crashed", "killed by SIGSEGV"),
-        ("kill_itself", "crashed", "killed by SIGKILL"),
-        ("abort", "crashed", "killed by SIGABRT"),
         ("leave", "crashed", "exit code 7"),
         ("close_everything", "crashed", "before its answer"),
         ("system_exit", "failed", "SystemExit: enough"),

@@ -39,11 +39,11 @@ def test_an_answer_replaces_no_file_that_its_scene_names(tmp_path: Path) -> None
     matrices, scene = tmp_path / "out/solution.npz", tmp_path / "scene.toml"
     assert not harness("export", "gallery/sheet-over-former", "--format", "npz", "--out", matrices).exit_code
     scene.write_text('[matrices]\nproblem = "out/solution.npz"\n')
-    before = matrices.read_bytes()
+    content = matrices.read_bytes()
     done = harness("solve", scene, "--out", tmp_path / "out")
     assert done.exit_code == 2
     assert "is one of the files that are read" in done.stderr
-    assert matrices.read_bytes() == before
+    assert matrices.read_bytes() == content
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -60,10 +60,3 @@ def test_refused_before_work(command: str, out: str, tmp_path: Path, monkeypatch
     assert out in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "locked"]
-
-
-def test_a_report_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "access", lambda _, mode: not mode & os.W_OK)
-    done = harness("report", tmp_path)
-    assert done.exit_code == 2
-    assert "no permission to write" in done.stderr

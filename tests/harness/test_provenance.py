@@ -59,7 +59,7 @@ def committed(folder: Path) -> str:
     return git(folder, "rev-parse", "HEAD")
 
 
-def asked(folder: Path, **environment: str) -> tuple[str, bool | None]:
+def code_of(folder: Path, **environment: str) -> tuple[str, bool | None]:
     """What the packages in that folder say. Compiled files would be untracked, as no .gitignore is copied."""
     variables = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", **environment}
     done = subprocess.run(
@@ -75,13 +75,13 @@ def test_a_commit_of_documents_or_results_is_no_other_code(tree: Path) -> None:
     (tree / "results").mkdir()
     for name in ("results/measurements.jsonl", "README.md"):
         (tree / name).write_text("said\n")
-    assert asked(tree) == (code, True)
+    assert code_of(tree) == (code, True)
     assert committed(tree) != code
-    assert asked(tree) == (code, True)
+    assert code_of(tree) == (code, True)
     with (tree / "pyproject.toml").open("a") as file:
         file.write("\n")
-    assert asked(tree) == (code, False)
-    assert committed(tree) == asked(tree)[0]
+    assert code_of(tree) == (code, False)
+    assert committed(tree) == code_of(tree)[0]
 
 
 @pytest.mark.parametrize("name", ["problems/__init__.py", "solvers/new.py"])
@@ -91,7 +91,7 @@ def test_a_work_tree_with_changes(tree: Path, name: str) -> None:
     (tree / name).parent.mkdir(exist_ok=True)
     with (tree / name).open("a") as file:
         file.write("\n# changed\n")
-    assert asked(tree) == (head, False)
+    assert code_of(tree) == (head, False)
 
 
 def test_a_hook_of_another_repository_does_not_lead_astray(tree: Path, tmp_path: Path) -> None:
@@ -100,13 +100,13 @@ def test_a_hook_of_another_repository_does_not_lead_astray(tree: Path, tmp_path:
     (other / "file").write_text("of another project")
     committed(other)
     hook = {"GIT_DIR": str(other / ".git"), "GIT_WORK_TREE": str(other), "GIT_INDEX_FILE": "index"}
-    assert asked(tree, **hook) == (head, True)
+    assert code_of(tree, **hook) == (head, True)
 
 
 def test_without_git_or_a_repository_the_version_is_named(tree: Path, tmp_path: Path) -> None:
-    assert asked(tree) == NOT_KNOWN
+    assert code_of(tree) == NOT_KNOWN
     committed(tree)
-    assert asked(tree, PATH=str(tmp_path)) == NOT_KNOWN
+    assert code_of(tree, PATH=str(tmp_path)) == NOT_KNOWN
 
 
 @pytest.mark.parametrize("tracked", [False, True])
@@ -117,7 +117,7 @@ def test_the_repository_of_another_project_is_not_ours(tmp_path: Path, tracked: 
     if not tracked:
         (tmp_path / "other/.gitignore").write_text(".venv/\n")
     committed(tmp_path / "other")
-    assert asked(site) == NOT_KNOWN
+    assert code_of(site) == NOT_KNOWN
 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:

@@ -80,11 +80,14 @@ def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
         with np.load(finished / row["answer"]) as saved:
             assert (saved["x"].shape, saved["lam"].shape) == ((20,), (10,))
     (problem,) = records.read(finished / "problems.jsonl")
-    with np.load(finished / "scenes" / "tiny.npz") as arrays, np.load(finished.parent / "tiny.npz") as given:
-        eigenvalues = np.linalg.eigvalsh(given["K"])
+    with (
+        np.load(finished / "scenes" / "tiny.npz") as arrays,
+        np.load(finished.parent / "tiny.npz") as source,
+    ):
+        eigenvalues = np.linalg.eigvalsh(source["K"])
         assert problem["cond_K"] == pytest.approx(eigenvalues[-1] / eigenvalues[0])
         assert problem["active"] == np.count_nonzero(arrays["gap_after"] < 1e-12) == rows[0]["active"]
-        assert np.array_equal(arrays["gap_before"], given["g"])
+        assert np.array_equal(arrays["gap_before"], source["g"])
     assert json.loads((finished / "machine.json").read_text())["machine"] == rows[0]["machine"]
 
 
@@ -212,13 +215,13 @@ def test_gate_with_nothing_to_judge(copy: Path, rows_kept: str) -> None:
 
 
 def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path) -> None:
-    asked = {
+    messages = {
         ("gate", folder / "nowhere"): "no such directory",
         ("run", "nosuch"): "no such suite",
         ("run", folder / "small.toml", "--solver", "exat"): "did you mean exact",
         ("run", folder / "small.toml", "--out", folder / "tiny.npz" / "out"): "cannot be written",
     }
-    for arguments, message in asked.items():
+    for arguments, message in messages.items():
         done = harness(*arguments)
         assert done.exit_code == 2
         assert message in done.stderr

@@ -156,11 +156,11 @@ def test_a_silent_scheduler_keeps_cases(job: Job, tmp_path: Path, monkeypatch: p
     with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9.*does not answer"):
         run(job, {}, out, quiet(), "tcp://127.0.0.1:9")
     assert run(job, {}, out, quiet()) == 0
-    before = list(series_file.rows(out))
+    rows = list(series_file.rows(out))
     more = replace(job, cases=replace(job.cases, count=CASES + 5))  # type: ignore[type-var]
     with pytest.raises(InputError, match="does not answer"):
         run(more, {}, out, quiet(), "tcp://127.0.0.1:9")
-    assert list(series_file.rows(out)) == before
+    assert list(series_file.rows(out)) == rows
 
 
 @needs_dask

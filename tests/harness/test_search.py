@@ -160,26 +160,17 @@ def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float, repeats: int)
     assert still_needed(replace(plan[0], repeat=4), [])
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"options": ("rough.least",)}, ["--option", "rough.least", "SOLVER.KEY=VALUE"]),
-        ({"options": ("rough.least=[1",)}, ["--option", "SOLVER.KEY=VALUE"]),
-        ({"options": ("rugh.least=1",)}, ["--option", "rugh", "did you mean rough?"]),
-    ],
-)
-def test_bad_options(tmp_path: Path, change: dict[str, Any], words: list[str]) -> None:
-    with pytest.raises(InputError) as caught:
-        suite_of(tmp_path, **change)
-    for word in words:
-        assert word in str(caught.value)
-
-
 def test_tolerances_of_the_command_line() -> None:
     assert tolerances_of(["auto"]) == "auto"
     assert tolerances_of(["1e-6", "1e-9"]) == (1e-6, 1e-9)
     with pytest.raises(InputError, match="numbers, or auto alone"):
         tolerances_of(["1e-6", "auto"])
+
+
+@pytest.mark.parametrize("option", ["rough.least", "rough.least=[1"])
+def test_a_bad_option(tmp_path: Path, option: str) -> None:
+    with pytest.raises(InputError, match=r"--option.*SOLVER\.KEY=VALUE"):
+        suite_of(tmp_path, options=(option,))
 
 
 def test_a_series_searches_for_nothing(tmp_path: Path) -> None:

@@ -227,8 +227,8 @@ def test_ratios_are_to_the_fastest_librarys_next_case_warm_or_cold() -> None:
         for (solver, threads), times in seconds.items()
         for k in range(4)
     ]
-    found = compared(pd.DataFrame(lines)).set_index(["solver", "threads"])["to_library"]
-    np.testing.assert_allclose(found["newton", 1], [np.nan, 0.25, 0.5, 1.5])
-    np.testing.assert_allclose(found["newton", 2], [np.nan, 0.25, 0.25, 0.25])
-    np.testing.assert_allclose(found["proxqp", 2], [np.nan, 0.5, 1.0, 4.5])
-    assert found["clarabel", 1].isna().all()
+    ratios = compared(pd.DataFrame(lines)).set_index(["solver", "threads"])["to_library"]
+    np.testing.assert_allclose(ratios["newton", 1], [np.nan, 0.25, 0.5, 1.5])
+    np.testing.assert_allclose(ratios["newton", 2], [np.nan, 0.25, 0.25, 0.25])
+    np.testing.assert_allclose(ratios["proxqp", 2], [np.nan, 0.5, 1.0, 4.5])
+    assert ratios["clarabel", 1].isna().all()

@@ -92,11 +92,11 @@ def test_rows_and_gaps_against_nnls(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_again_solves_nothing_and_more_cases_extend() -> None:
     series("--cases", "20", "--out", "grown")
-    before = rows_of("grown")
+    first = rows_of("grown")
     assert "20 cases, 20 already" in series("--cases", "20", "--out", "grown").output
-    assert rows_of("grown") == before
+    assert rows_of("grown") == first
     assert "45 cases, 20 already" in series("--cases", "45", "--out", "grown").output
-    assert rows_of("grown")[:20] == before
+    assert rows_of("grown")[:20] == first
     series("--cases", "45", "--out", "at-once")
     np.testing.assert_allclose(gaps_of("grown"), gaps_of("at-once"), atol=1e-9)
 

@@ -33,8 +33,8 @@ def hashes(package: Path) -> dict[str, str]:
     return {name: hash_of(package / f"{file}.py", package) for name, file in files.items()}
 
 
-def changed(package: Path, before: dict[str, str]) -> set[str]:
-    return {name for name, now in hashes(package).items() if now != before[name]}
+def changed(package: Path, unchanged: dict[str, str]) -> set[str]:
+    return {name for name, now in hashes(package).items() if now != unchanged[name]}
 
 
 def test_a_copy_elsewhere_has_the_same_hash(package: Path) -> None:
@@ -43,12 +43,12 @@ def test_a_copy_elsewhere_has_the_same_hash(package: Path) -> None:
 
 
 def test_words_and_layout_do_not_count(package: Path) -> None:
-    before = hashes(package)
+    unchanged = hashes(package)
     for file in package.rglob("*.py"):
         with file.open("a") as added:
             added.write('\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n')
     added = hashes(package)
-    assert changed(package, before) == set(modules())  # a function is code
+    assert changed(package, unchanged) == set(modules())  # a function is code
     for file in package.rglob("*.py"):
         change(file, "# a comment\n\n\n", "# another comment\n")
         change(
@@ -61,21 +61,21 @@ def test_words_and_layout_do_not_count(package: Path) -> None:
 
 
 def test_a_constant_two_imports_down_counts_for_those_who_use_it(package: Path) -> None:
-    before = hashes(package)
+    unchanged = hashes(package)
     # ipm → kkt, newton → sweeps → kkt; the libraries do not
     change(package / "kkt.py", "EPS = float(np.finfo(float).eps)", "EPS = 2 * float(np.finfo(float).eps)")
     users = {"ipm", "newton", "textbook-active-set"}
-    assert changed(package, before) & {*users, "osqp", "nnls"} == users
+    assert changed(package, unchanged) & {*users, "osqp", "nnls"} == users
 
 
 def test_a_library_does_not_depend_on_the_solvers_of_the_house(package: Path) -> None:
-    before = hashes(package)
+    unchanged = hashes(package)
     (package / "libraries/osqp.py").write_text("OTHER = 1\n")
     (package / "methods/newton.py").write_text("OTHER = 1\n")
-    assert changed(package, before) == {"osqp", "newton"}
+    assert changed(package, unchanged) == {"osqp", "newton"}
     (package / "adapter.py").write_text("OTHER = 1\n")
     users = {"osqp", "newton", "piqp", "nnls"}
-    assert changed(package, before) & {*users, "gi"} == users
+    assert changed(package, unchanged) & {*users, "gi"} == users
 
 
 @pytest.mark.parametrize(
@@ -141,13 +141,13 @@ def test_helpers_of_a_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, li
     def identity() -> tuple[str, str]:
         return code_of(make_solver("mine", {}, mine)), solver_version("mine", mine)
 
-    before = identity()
+    unchanged = identity()
     for name in ("other.py", "data.json", "package/other.py"):
         (tmp_path / name).write_text("def f(): return 2\n")
-    assert identity() == before
+    assert identity() == unchanged
     text = (tmp_path / helper).read_text()
     (tmp_path / helper).write_text(text + "\nx = 2\n")
-    assert [now == then for now, then in zip(identity(), before, strict=True)] == [False, False]
+    assert [now == then for now, then in zip(identity(), unchanged, strict=True)] == [False, False]
 
 
 def test_what_is_installed_and_the_project_is_not_a_plugins_own(tmp_path: Path) -> None:

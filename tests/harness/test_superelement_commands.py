@@ -134,11 +134,6 @@ def test_what_is_exported_is_the_same_problem(folder: Path, tmp_path: Path) -> N
         np.testing.assert_allclose(again["x"], first["unknowns"], atol=1e-9)
 
 
-def test_small_dense_parts_have_a_sparse_form(folder: Path) -> None:
-    done = harness("export", folder / "edited.toml", "--form", "sparse", "--out", folder / "program.npz")
-    assert done.exit_code == 0, done.output
-
-
 def test_the_example_is_solved_and_made_again(tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "examples" / "own-parts"
     done = harness("solve", example / "joint.toml", "--out", tmp_path / "out")

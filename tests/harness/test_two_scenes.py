@@ -51,18 +51,18 @@ def test_springs_and_contacts_balance_what_the_parts_without_them_resist(tmp_pat
     scene = read_scene(str(bare))
     data, load = prepared(scene), load_case(scene)
     pull = data.assembly.K.multiply(x) + data.assembly.A @ lam - load.f
-    found = list(fastener_forces(read_scene(str(tied)), x))
-    springs = [entry for entry in found if entry["kind"] == "installed_fasteners"]
+    forces = list(fastener_forces(read_scene(str(tied)), x))
+    springs = [entry for entry in forces if entry["kind"] == "installed_fasteners"]
     assert [(entry["x"], entry["y"]) for entry in springs] == [(80.0, 40.0), (120.0, 20.0)]
     for entry in springs:
         node = round(entry["x"] / 20) + 9 * round(entry["y"] / 20)
         assert pull[node] == pytest.approx(entry["force_N"], abs=1e-8)
         assert pull[45 + node] == pytest.approx(-entry["force_N"], abs=1e-8)
         assert abs(entry["force_N"]) > 1.0
-    preloads = [entry["force_N"] for entry in found if entry["kind"] == "fasteners"]
+    preloads = [entry["force_N"] for entry in forces if entry["kind"] == "fasteners"]
     assert preloads == [80.0, 80.0]
     table = rows(tmp_path / "out" / "fasteners.csv")
-    assert [float(row["force_N"]) for row in table] == [entry["force_N"] for entry in found]
+    assert [float(row["force_N"]) for row in table] == [entry["force_N"] for entry in forces]
 
 
 def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path) -> None:

@@ -54,17 +54,17 @@ def test_a_part_alone_is_a_linear_solve(path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         "problems.stiffness.dense_block.lapack.dpotri", lambda *_: pytest.fail("K was inverted for Q")
     )
-    found = answered(path, path.parent / "out", solver="piqp")
-    assert (found["n"], found["m"], found["qp"]) == (18, 0, False)
-    assert found["method"].startswith("linear solve")
-    assert found["error_bound_mm"] < 1e-15
+    answer = answered(path, path.parent / "out", solver="piqp")
+    assert (answer["n"], answer["m"], answer["qp"]) == (18, 0, False)
+    assert answer["method"].startswith("linear solve")
+    assert answer["error_bound_mm"] < 1e-15
     said = "the quadratic program: it was not called for. The scene has no contact; piqp was not run"
-    assert said in found["skipped"]
+    assert said in answer["skipped"]
     # A cantilever of length L under q on its last c mm: the work of the load is Σ fᵀx = ∫ M²/EI.
     q, c, L, EI = 1e-3 * 40.0, 100.0, 400.0, 70e3 * 40.0 * 4.0**3 / 12
     work = (q**2 * c**5 / 20 + (q * c) ** 2 * ((L - c / 2) ** 3 - (c / 2) ** 3) / 3) / EI
     f = load_case(read_scene(str(path))).f
-    assert f @ found["x"] == pytest.approx(work, rel=2e-3)  # f stands on the nodes
+    assert f @ answer["x"] == pytest.approx(work, rel=2e-3)  # f stands on the nodes
 
 
 def test_its_page_has_no_contacts(path: Path) -> None:
@@ -97,11 +97,11 @@ def test_there_and_back(form: str, path: Path) -> None:
     assert file.is_dir() == formats.FORMATS[form].is_folder
     import_matrices(files_of(form, file), back)
     own, scene = read_scene(str(back)), read_scene(str(path))
-    wanted, found = prepared(scene), prepared(own)
-    np.testing.assert_array_equal(found.assembly.K.matrices[0], wanted.assembly.K.matrices[0])
+    wanted, imported = prepared(scene), prepared(own)
+    np.testing.assert_array_equal(imported.assembly.K.matrices[0], wanted.assembly.K.matrices[0])
     np.testing.assert_array_equal(load_case(own).f, load_case(scene).f)
-    assert found.assembly.A.shape == (18, 0)
-    assert found.Q.shape == (0, 0)
+    assert imported.assembly.A.shape == (18, 0)
+    assert imported.Q.shape == (0, 0)
     x = answered(path, path.parent / "one")["x"]
     np.testing.assert_array_equal(answered(back, path.parent / "two")["x"], x)
 

@@ -11,7 +11,7 @@ from synthetic_results import results, row
 
 from problems.ladders import ladders
 from report.figures import style
-from report.figures.junction_maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
+from report.figures.junction_maps import CLOSED, LARGER, MARK, RIM
 from report.sections.ladders import COUNTED, ladder_map, with_outcomes
 from solvers.registry import owner_of, solver_names
 
@@ -69,17 +69,6 @@ def test_a_wrong_answer_on_a_rung_says_by_how_much(tmp_path: Path, error: float,
     (axes,) = ladder_map(cells, list(cells["label"]), {"conditioning": ["1e+10"]}).axes
     assert {shown, "cond(K)", "conditioning"} <= {text.get_text() for text in axes.texts}
     assert axes.get_xticklabels()[0].get_text() == "1e+10"
-
-
-def test_many_marks_hide_no_field() -> None:
-    nodes = np.column_stack([np.repeat(np.arange(20.0), 20), np.tile(np.arange(20.0), 20)])
-    scale = rooted("gap, mm", "viridis", np.ones(400))
-    sizes = {}
-    for count in (4, 252):
-        marks = {"fasteners": np.linspace(0, 19, count)[:, None].repeat(2, axis=1).tolist()}
-        _, (axes,) = drawn([Map("", nodes, np.ones(400), scale, (), marks)], 1)
-        sizes[count] = max(line.get_markersize() for line in axes.lines)
-    assert sizes[252] < sizes[4] / 1.4
 
 
 def test_what_is_larger_than_allowed_looks_like_nothing_else() -> None:

@@ -42,12 +42,12 @@ def table(folder: Path, made: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def test_the_fastest_of_each_owner_scene_by_scene(tmp_path: Path) -> None:
-    found = table(tmp_path, rows())
-    more = found.loc[ONE_MORE]
+    ratios = table(tmp_path, rows())
+    more = ratios.loc[ONE_MORE]
     assert (more["scenes"], more["seconds"], more["seconds_most"]) == (2, pytest.approx(0.15), 0.2)
     assert (more["textbook"], more["textbook_least"]) == (pytest.approx(3.5), pytest.approx(2.0))
     assert (more["library_least"], more["library_none"]) == (pytest.approx(30.0), 1)
-    first = found.loc[FROM_SCENE]  # the sparse form: 0.5 + 1 s; the dual one 7 s more
+    first = ratios.loc[FROM_SCENE]  # the sparse form: 0.5 + 1 s; the dual one 7 s more
     assert first["seconds"] == pytest.approx(1.5)
     assert first["library_least"] == pytest.approx(3.5 / 1.5)
     assert first["textbook_least"] == pytest.approx(7.4 / 1.5)

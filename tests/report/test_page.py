@@ -15,7 +15,7 @@ from synthetic_results import SIZES, everything, no_answer, results, row, write_
 from synthetic_series import made as made_series
 
 from report.figures import style
-from report.page import answer_page_data, contact_maps, run_page_data
+from report.page import contact_maps, run_page_data
 from report.page.page_file import packed, write
 from report.page.run_page_data import run_data
 from report.results.reader import read
@@ -23,6 +23,8 @@ from report.results.series_results import QUANTILES, quantile_maps
 from report.results.series_results import read as read_series
 from report.writers.series_report import write as write_series
 
+#: `HOSTILE` in Markdown.
+LITERAL = r"&lt;b&gt;x&lt;/b&gt;\|\!\[i\](http://e)&#96;c&#96;\$a_b\$ \*e\* \# h�\[31m��"
 MOST_BYTES = 3_300_000
 
 
@@ -109,7 +111,12 @@ def test_a_published_page_is_small_and_alone(directory: Path, tmp_path: Path) ->
 @pytest.mark.parametrize(("made", "written"), MADE)
 def test_hostile_text_ends_no_script_and_begins_no_element(made: Any, written: Any, tmp_path: Path) -> None:
     hostile = f"</script><script>alert(1)</script><!--<img src=x>{HOSTILE}"
-    written(made(tmp_path, hostile))
+    report = written(made(tmp_path, hostile)).read_text("utf-8")
+    assert LITERAL in report
+    for raw in ("<b>", "![i]", "`c`", "$a_b$", "*e*", "\n# h", "\x1b", "\u202e"):
+        assert raw not in report
+    lines = [line.replace(r"\|", "") for line in report.splitlines() if LITERAL in line and line[0] == "|"]
+    assert 1 not in {line.count("|") for line in lines}
     (path,) = tmp_path.rglob("index.html")
     text = path.read_text("utf-8")
     page = Page(text)
@@ -117,7 +124,7 @@ def test_hostile_text_ends_no_script_and_begins_no_element(made: Any, written: A
     assert "img" not in {tag for tag, _ in page.elements}
     assert text.count("</script>") == 3
     assert "</script><script>alert(1)</script>" in page.shown
-    assert not any("\ue000" <= character <= "\uf8ff" for character in text)
+    assert not any("\ue000" <= character <= "\uf8ff" for character in report + text)
 
 
 def test_an_array_keeps_four_digits_and_what_is_not_finite() -> None:
@@ -138,17 +145,17 @@ def test_an_answer_outside_its_own_limit_has_seconds_from_the_scene(tmp_path: Pa
 
 def test_maps_that_do_not_fit_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     directory = everything(tmp_path, SIZES)
-    found = run_data(read(directory))["maps"]
-    assert [each["name"] for each in found["maps"]] == ["4386/0100", "4386/1500", "11308/2500"]
-    assert len(found["groups"]) == 2  # two scenes have the same contacts
+    maps = run_data(read(directory))["maps"]
+    assert [each["name"] for each in maps["maps"]] == ["4386/0100", "4386/1500", "11308/2500"]
+    assert len(maps["groups"]) == 2  # two scenes have the same contacts
     with np.load(directory / "scenes" / "4386_1500.npz") as arrays:
         np.testing.assert_allclose(
-            unpacked(found["maps"][1]["fields"]["force"]["values"]), arrays["lam"], rtol=2.0**-12
+            unpacked(maps["maps"][1]["fields"]["force"]["values"]), arrays["lam"], rtol=2.0**-12
         )
     monkeypatch.setattr(contact_maps, "BUDGET", 40_000)
     (directory / "scenes" / "4386_0100.npz").write_bytes(b"PK torn")
-    found = run_data(read(directory))["maps"]
-    assert {"4386/0100", "11308/2500"} <= set(found["left_out"])
+    maps = run_data(read(directory))["maps"]
+    assert {"4386/0100", "11308/2500"} <= set(maps["left_out"])
 
 
 def test_a_series_has_its_quantiles_its_worst_case_and_a_curve_for_each_contact(tmp_path: Path) -> None:
@@ -171,12 +178,12 @@ def test_two_answers_have_both_gaps_and_their_difference() -> None:
     nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 20.0)])
     answers = [{"contact_nodes": nodes, "gap_after": np.arange(6) * scale} for scale in (0.1, 0.3)]
     pairs = [{"pair": ["a", "b"], "start": 0, "stop": 4}, {"pair": ["b", "c"], "start": 4, "stop": 6}]
-    found = contact_maps.two_answers_maps({"pairs": pairs}, answers)
-    first, second, change = (unpacked(field["values"]) for field in found["maps"][1]["fields"].values())
+    maps = contact_maps.two_answers_maps({"pairs": pairs}, answers)
+    first, second, change = (unpacked(field["values"]) for field in maps["maps"][1]["fields"].values())
     np.testing.assert_allclose(first, [0.4, 0.5], rtol=2.0**-12)
     np.testing.assert_allclose(second, [1.2, 1.5], rtol=2.0**-12)
     np.testing.assert_allclose(change, [0.8, 1.0], rtol=2.0**-12)
-    places = [unpacked(found["groups"][1][name]) for name in ("x", "y")]
+    places = [unpacked(maps["groups"][1][name]) for name in ("x", "y")]
     np.testing.assert_array_equal(np.transpose(places), nodes[4:])
 
 
@@ -206,15 +213,3 @@ def test_a_directory_without_an_answer_has_a_page(tmp_path: Path) -> None:
     assert column(data, "load_case_s") == [None]
     empty = page_of(write_rows(tmp_path / "empty", []), tmp_path / "index.html").data
     assert column(empty, "key") == []
-
-
-def test_the_banners_name_the_code(tmp_path: Path) -> None:
-    mixed = results(tmp_path, [row(commit="a" * 40), row(solver="gi", commit="b" * 40)])
-    assert "mix rows" in run_data(mixed)["banner"]["warnings"][0]
-    record = {"method": "newton", "machine": "CPU", "commit": "a" * 40, "recorded_at": "2026-01-02T03:04:05"}
-    clean = answer_page_data._banner([record | {"clean": True}])
-    assert (clean["machines"], clean["measured"]) == (["CPU"], "2026-01-02 03:04 UTC")
-    assert clean["commits"] == "a" * 40 + " (clean)"
-    assert not clean["warnings"]
-    assert "uncommitted" in answer_page_data._banner([record | {"clean": False}])["warnings"][0]
-    assert answer_page_data._banner([{"method": "newton"}])["commits"] == "not recorded"

@@ -3,7 +3,6 @@
 import json
 import math
 import re
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from report.document.blocks import Figure
 from report.document.numbers import significant
 from report.results.reader import Results, read
 from report.sections.speed import contacts
-from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard, summary
+from report.sections.summary import EACH, PREPARED, advice, explained, summary
 from report.writers.suite_report import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -50,13 +49,13 @@ def tiny(tmp_path: Path) -> Path:
 
 
 def test_standings_of_a_tiny_run(tiny: Path) -> None:
-    found = standings(read(tiny).cells).set_index("method")
-    assert found.index.tolist() == ["a (dual)", "b (primal)", "c (dual)", "d (dual)"]
+    lines = standings(read(tiny).cells).set_index("method")
+    assert lines.index.tolist() == ["a (dual)", "b (primal)", "c (dual)", "d (dual)"]
     # a: sqrt(2 · 8) = 4; b: sqrt(1 · 36) = 6; c answers half of the scenes, d none: not compared
-    assert found["load_case_s_4386"].tolist() == pytest.approx([4.0, 6.0, math.nan, math.nan], nan_ok=True)
-    assert found["within"].tolist() == [2, 2, 1, 0]
-    assert found.loc["d (dual)", ["outside", "outside_claimed", "worst_error_mm"]].tolist() == [2, 1, 3e-6]
-    assert found.loc["c (dual)", ["no_answer", "no_answer_because"]].tolist() == [1, "1 time limit"]
+    assert lines["load_case_s_4386"].tolist() == pytest.approx([4.0, 6.0, math.nan, math.nan], nan_ok=True)
+    assert lines["within"].tolist() == [2, 2, 1, 0]
+    assert lines.loc["d (dual)", ["outside", "outside_claimed", "worst_error_mm"]].tolist() == [2, 1, 3e-6]
+    assert lines.loc["c (dual)", ["no_answer", "no_answer_because"]].tolist() == [1, "1 time limit"]
 
 
 def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> None:
@@ -125,20 +124,6 @@ def test_several_tolerances_and_threads_stand_in_the_label(tmp_path: Path) -> No
     assert set(results(tmp_path, rows).cells["label"]) == labels
 
 
-def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> None:
-    rows = [row(f"{n}/{k:04d}", "a") for n, most in ((4386, 12), (6112, 7), (11308, 7)) for k in range(most)]
-    rows += [row("4386/0000", "b")]
-    cells = results(tmp_path, rows).cells
-    upper, lower = scoreboard(cells, standings(cells)).axes
-    assert [[tick.get_text() for tick in axes.get_yticklabels()] for axes in (upper, lower)] == [
-        ["a (dual)   26 of 26", "b (dual)   1 of 1"],
-        ["a (dual)   26 of 26"],
-    ]
-    assert [len(axes.patches) for axes in (upper, lower)] == [13, 14]
-    boxes = [[t.get_window_extent() for t in axes.get_xticklabels()] for axes in (upper, lower)]
-    assert not any(a.overlaps(b) for of_axes in boxes for a, b in pairwise(of_axes))
-
-
 def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
     rows = [row(f"4386/{k}", "a", **times(solve_s=1.0)) for k in (100, 200, 400)]
     rows += [row("4386/300", "a", **no_answer("time_limit"))]
@@ -198,12 +183,3 @@ def test_what_was_not_run_stands_in_the_picture_of_all_scenes(tmp_path: Path) ->
     (picture,) = [block for block in section.blocks if isinstance(block, Figure)]
     texts = [text.get_text() for text in picture.drawing.axes[0].texts]
     assert texts.count("not run") == 3
-
-
-def test_a_run_of_one_scene_is_titled_after_it(tmp_path: Path) -> None:
-    write_rows(tmp_path, [row(LOW, "a"), row(LOW, "b")])
-    (tmp_path / "suite.toml").write_text('title = "On all three sizes"', "utf-8")
-    (tmp_path / "problems.jsonl").write_text(json.dumps({"scene": LOW, "title": "A joint"}) + "\n", "utf-8")
-    assert write(tmp_path).read_text("utf-8").startswith(f"# {LOW}: A joint\n")
-    write_rows(tmp_path, [row(LOW, "a"), row(HIGH, "a")])
-    assert write(tmp_path).read_text("utf-8").startswith("# On all three sizes\n")

@@ -9,7 +9,6 @@ from synthetic_results import row, write_rows
 
 from report.analysis import checks
 from report.analysis.checks import warnings
-from report.figures import style
 from report.results.reader import read
 from report.results.rows import in_order
 from report.writers.suite_report import write
@@ -42,17 +41,6 @@ def test_ours_first_then_by_name_and_the_sparse_form_before_dual_and_primal(tmp_
         *("mine (dual)", "mine (other)", "piqp (primal)"),
     ]
     assert in_order(cells, "solver") == ["gi", "newton", "clarabel", "mine", "piqp"]
-
-
-def test_three_forms_look_different_and_are_explained(tmp_path: Path) -> None:
-    rows = [row(scene, "newton", form) for form in style.FORMS for scene in (LOW, "4386/0500", HIGH)]
-    results = read(write_rows(tmp_path, rows))
-    looks = style.line_styles(results.cells)
-    assert len({look["markerfacecolor"] for look in looks.values()}) == 3
-    assert len({str(look["linestyle"]) for look in looks.values()}) == 3
-    text = write(tmp_path).read_text("utf-8")
-    assert "Solid and filled: dual form; dashed and hollow: primal form; dash-dotted and pale: sparse" in text
-    assert all(f"*{form}*, " in text for form in style.FORMS)
 
 
 # Different code.

@@ -54,13 +54,13 @@ def test_the_reports_forms_are_those_of_the_problems() -> None:
 
 def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
     rows = [sparse(), dense(), dense(solver="clarabel", form="primal", stages="K", form_s=None)]
-    found = lines(tmp_path, rows)
-    assert totals(found.loc["newton (sparse)"]) == pytest.approx([0.9, 0.9 + 9 * 0.3, 0.9 + 999 * 0.3])
-    assert totals(found.loc["newton (dual)"]) == pytest.approx([11.9, 11.9 + 0.9, 11.9 + 99.9])
-    primal = found.loc["clarabel (primal)"]
+    stages = lines(tmp_path, rows)
+    assert totals(stages.loc["newton (sparse)"]) == pytest.approx([0.9, 0.9 + 9 * 0.3, 0.9 + 999 * 0.3])
+    assert totals(stages.loc["newton (dual)"]) == pytest.approx([11.9, 11.9 + 0.9, 11.9 + 99.9])
+    primal = stages.loc["clarabel (primal)"]
     assert totals(primal) == pytest.approx([8.5 + 0.37, 8.87 + 9 * 0.07, 8.87 + 999 * 0.07])
     assert (primal["factors_s"], primal["Q_s"], primal["stored_mib"]) == (0, 0, 80)
-    assert found["stored_mib"][["newton (dual)", "newton (sparse)"]].tolist() == [200, 0]
+    assert stages["stored_mib"][["newton (dual)", "newton (sparse)"]].tolist() == [200, 0]
 
 
 @pytest.mark.parametrize(

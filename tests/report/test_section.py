@@ -42,20 +42,20 @@ def test_both_lines_go_through_the_largest_gap(worst: int) -> None:
     figure = section_figure(record, arrays)
     assert figure is not None
     place = arrays["contact_nodes"][worst]
-    own = slice(0, 21) if worst < 21 else slice(21, 42)
-    moved = arrays["x"][own]  # of the first part of the pair
+    of_pair = slice(0, 21) if worst < 21 else slice(21, 42)
+    moved = arrays["x"][of_pair]  # of the first part of the pair
     for axes, axis in zip(figure.axes, (0, 1), strict=True):
-        first, second, before, begun = axes.get_lines()
-        on = np.isclose(arrays["contact_nodes"][own][:, 1 - axis], place[1 - axis])
-        order = np.argsort(arrays["contact_nodes"][own][on][:, axis])
+        first, second, of_second, was = axes.get_lines()
+        on = np.isclose(arrays["contact_nodes"][of_pair][:, 1 - axis], place[1 - axis])
+        order = np.argsort(arrays["contact_nodes"][of_pair][on][:, axis])
 
         def along(values: np.ndarray, on: np.ndarray = on, order: np.ndarray = order) -> np.ndarray:
-            return values[own][on][order]
+            return values[of_pair][on][order]
 
         np.testing.assert_allclose(first.get_xdata(), (X, Y)[axis])
         np.testing.assert_allclose(first.get_ydata(), moved[on][order])
         np.testing.assert_allclose(second.get_ydata() - first.get_ydata(), along(arrays["gap_after"]))
-        np.testing.assert_allclose(begun.get_ydata() - before.get_ydata(), along(arrays["gap_before"]))
+        np.testing.assert_allclose(was.get_ydata() - of_second.get_ydata(), along(arrays["gap_before"]))
         assert (second.get_ydata() - first.get_ydata()).max() == 2.0
     (legend,) = figure.legends
     names = [text.get_text() for text in legend.get_texts()]

@@ -28,7 +28,7 @@ from paper_results import (
 from synthetic_results import no_answer
 
 from studies.paper import __main__ as paper
-from studies.paper import claims, printed
+from studies.paper import claims
 from studies.paper.claims import EVIDENCE
 from studies.paper.figures5_7 import crossings
 
@@ -50,19 +50,6 @@ def page(directory: Path, rows: Rows) -> str:
 def table(directory: Path, rows: Rows, name: str, index: str) -> pd.DataFrame:
     page(directory, rows)
     return pd.read_csv(directory / "study" / f"{name}.csv").set_index(index)
-
-
-def test_the_printed_tables() -> None:
-    assert [len(c) for both in printed.TABLE_1.values() for c in both.values()] == [36, 36, 34, 34]
-    # the lines of iterations 1, 20, 29 and 34 of Table 1, read off the page
-    lines = {1: (18395, 19636, 20, 22), 20: (30, 25, 11, 10), 29: (940, 242, 14, 13), 34: (6406, 3690, 23, 9)}
-    for k, line in lines.items():
-        assert tuple(c[k - 1] for both in printed.TABLE_1.values() for c in both.values()) == line
-    none, V = ({k: sum(c) for k, c in both.items()} for both in printed.TABLE_1.values())
-    assert sum(none.values()) > 300 * sum(V.values())  # the collapse that the text speaks of
-    assert list(printed.TABLE_2) == [52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592]
-    assert printed.TABLE_2[1347] == {"stp1": (25, 75.866), "stp2": (21, 71.506), "algorithm_5": (20, 64.038)}
-    assert all(n in (2 * m, 2 * m + 1) for _, n, m, _ in printed.TABLE_4)
 
 
 def test_the_whole_page(tmp_path: Path) -> None:
@@ -116,13 +103,6 @@ def test_table_3_fits_what_the_rows_say(tmp_path: Path) -> None:
     assert data.loc[(11308, "GI primal"), "working time, s"] == "> 33"
 
 
-def test_table_4_compares_the_condition(tmp_path: Path) -> None:
-    rows = [ipm_row("4386/0052", 4386, 52), ipm_row("scaling/6112", 6112, 1000)]
-    lines = table(tmp_path, rows, "table4", "problem")
-    assert lines.loc[1, "difference"] == "'+0.01%"  # as text: no formula of a spreadsheet
-    assert pd.isna(lines.loc[2, "cond(K)"])
-
-
 def curve(name: str, seconds: Callable[[float], float], shares: list[float]) -> Rows:
     make = {"IPM": ipm_row, "GI dual": lambda *at, **f: gi_row(*at, "dual", **f)}[name]
     at = [(f"4386/{round(2193 * s):04d}", 4386, round(2193 * s)) for s in shares]
@@ -149,12 +129,6 @@ def test_a_crossing_beside_a_stopped_run_is_an_interval(tmp_path: Path, limit: f
     rows = curve("IPM", lambda s: 2.0, [0.1, 0.4, 0.8]) + curve("GI dual", lambda s: 1.0, [0.1, 0.4, 0.8])
     rows = changed(rows, lambda r: gi("dual")(r) and r["active"] < 300, **late(limit))
     assert crossings(studied(tmp_path, rows), 4386, "GI dual", "IPM") == text
-
-
-def test_of_several_tolerances_the_tightest(tmp_path: Path) -> None:
-    at = ("4386/0052", 4386, 52)
-    rows = [ipm_row(*at, tolerance=t, solve_s=s) for t, s in ((1e-8, 1.0), (1e-14, 3.0))]
-    assert [r["load_case_s"] for r in studied(tmp_path, rows).of("IPM").values()] == [3.0]
 
 
 def test_times_of_two_machines_are_refused(tmp_path: Path) -> None:

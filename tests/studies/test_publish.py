@@ -42,14 +42,14 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def publish(monkeypatch: pytest.MonkeyPatch, run: Callable[[Sequence[str]], int]) -> tuple[int, list[str]]:
     """Exit code, and what was measured, each by `run`, which is given the words of a command."""
-    asked: list[str] = []
+    suites: list[str] = []
 
     def ended(words: Sequence[str]) -> int:
-        asked.append(words[1])
+        suites.append(words[1])
         return run(words)
 
     monkeypatch.setattr(published, "ended", ended)
-    return published.main(SUITES), asked
+    return published.main(SUITES), suites
 
 
 def good(words: Sequence[str]) -> int:

@@ -135,7 +135,7 @@ def test_fasteners_are_dragged_added_and_saved(chromium: Any, served: tuple[str,
 
 def test_sliders_move_the_gap_and_the_limit(chromium: Any, served: tuple[str, Path]) -> None:
     opened(chromium, served[0])
-    before = shown(chromium, "proven", "FAIL")
+    first = shown(chromium, "proven", "FAIL")
     slide = (
         MODEL
         + "const s = found('Slider', arguments[0]); s.value = arguments[1]; s.value_throttled = arguments[1]"
@@ -143,29 +143,8 @@ def test_sliders_move_the_gap_and_the_limit(chromium: Any, served: tuple[str, Pa
     chromium.execute_script(slide, 0, 0.2)
     shown(chromium, "PASS", "above 0.2 mm")
     chromium.execute_script(slide, 2, 0.08)
-    after = shown(chromium, "proven", without=f'id="gap">{said_gap(before):g}<')
-    assert said_gap(after) > said_gap(before) + 0.01
-
-
-def test_a_wrong_place_is_refused_in_the_page(chromium: Any, served: tuple[str, Path]) -> None:
-    opened(chromium, served[0])
-    script = (
-        MODEL
-        + """
-const source = all.filter(
-    m => m.type == 'GlyphRenderer' && m.glyph.type == 'Scatter')[0].data_source;
-source.data = {x: [900, 50], y: [10, 25]};
-"""
-    )
-    chromium.execute_script(script)
-    for _ in range(200):
-        texts = chromium.execute_script(
-            MODEL + "return [0, 1, 2].map(k => found('Div', k)?.text ?? '').join(' ')"
-        )
-        if "fasteners.points[0]" in texts:
-            break
-        time.sleep(0.05)
-    assert "on the junction" in texts
+    after = shown(chromium, "proven", without=f'id="gap">{said_gap(first):g}<')
+    assert said_gap(after) > said_gap(first) + 0.01
 
 
 def test_only_who_knows_the_address_is_served(served: tuple[str, Path]) -> None:

@@ -63,7 +63,7 @@ def springs(random: np.random.Generator, edges: list[tuple[int, int]], count: in
     return K
 
 
-def own(draw: Draw, folder: Path) -> Task:
+def chains(draw: Draw, folder: Path) -> Task:
     """Two chains of springs as K, A, f, g, imported and solved."""
     random, n = draw.random, int(draw.random.integers(3, 6))
     K = sla.block_diag(*(springs(random, [(i, i + 1) for i in range(n - 1)], n) for _ in "ab"))
@@ -270,7 +270,7 @@ def judged(draw: Draw, folder: Path) -> Task:
     return x, lambda: (read_answer(folder / "x.csv")["x"], [])
 
 
-TARGETS = (own, own, joint, joint, joint, around, listed, judged)
+TARGETS = (chains, chains, joint, joint, joint, around, listed, judged)
 
 
 def tried(log: Log, draw: Draw, folder: Path) -> None:

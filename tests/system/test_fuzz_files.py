@@ -25,29 +25,29 @@ CODES = {0, 1, 2, 3, 4, 5}
 
 def contents(folder: Path, keeps: Callable[[str], bool]) -> dict[str, str]:
     """The kind or the hash of each file; pipes and devices are not read."""
-    found = {}
+    kinds = {}
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
         if keeps(name) and not (path.is_dir() and not path.is_symlink()):
             if path.is_symlink():
-                found[name] = f"-> {path.readlink()}"
+                kinds[name] = f"-> {path.readlink()}"
             elif path.is_file():
-                found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+                kinds[name] = hashlib.sha256(path.read_bytes()).hexdigest()
             else:
-                found[name] = "special"
-    return found
+                kinds[name] = "special"
+    return kinds
 
 
 @pytest.fixture(scope="module")
 def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
     root = tmp_path_factory.mktemp("targets")
-    before = resource.getrlimit(resource.RLIMIT_AS)
+    memory = resource.getrlimit(resource.RLIMIT_AS)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(root / "cache"))
         made = all_targets(root)
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, before[1]))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, memory[1]))
         yield made
-    resource.setrlimit(resource.RLIMIT_AS, before)
+    resource.setrlimit(resource.RLIMIT_AS, memory)
 
 
 def test_hostile_files(targets: list[Target], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,13 +83,13 @@ def _tried(
         return
     command = target.commands[random.integers(len(target.commands))]
     log.where += f": {name} {done}; {' '.join(command)}"
-    before = contents(work, target.keeps)
+    files = contents(work, target.keeps)
     code, output = invoke(work, command)
     if code not in CODES or (code and not output.strip()):
         raise Fault("words", f"exit code {code}: {output[-300:]}")
     if "Traceback" in output or "\x1b" in output:
         raise Fault("words", output[-300:])
-    if contents(work, target.keeps) != before:
+    if contents(work, target.keeps) != files:
         raise Fault("lost", "a file")
     target.checked(work, command, code, output)
     log.seen[f"{target.name} {code}"] += 1

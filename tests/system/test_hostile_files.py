@@ -26,20 +26,20 @@ def own_matrices(**changes: Any) -> formats.Data:
 # --- import and export --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("own", [True, False])
-def test_a_refused_import_leaves_files(own: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("same", [True, False])
+def test_a_refused_import_leaves_files(same: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The input itself, and another file."""
     monkeypatch.chdir(tmp_path)  # a long path would be cut in the message
     bad = Path("bad.npz")
     np.savez(bad, **own_matrices(K=-np.eye(12)))
-    out = bad if own else Path("mine.npz")
-    if not own:
+    out = bad if same else Path("mine.npz")
+    if not same:
         out.write_bytes(b"precious")
-    before = out.read_bytes()
+    content = out.read_bytes()
     refused = harness("import", bad, "--out", out)
     assert refused.exit_code == 2
     assert str(bad) in refused.output
-    assert out.read_bytes() == before
+    assert out.read_bytes() == content
     assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
 
 
@@ -49,31 +49,31 @@ def test_a_refused_import_leaves_files(own: bool, tmp_path: Path, monkeypatch: p
 )
 def test_an_import_replaces_no_input(out: str, said: str, tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", **own_matrices())
-    before = (tmp_path / "mine.npz").read_bytes()
+    content = (tmp_path / "mine.npz").read_bytes()
     (tmp_path / "link.npz").symlink_to("mine.npz")
     done = harness("import", tmp_path / "mine.npz", "--out", tmp_path / out)
     assert done.exit_code == 2
     assert said in done.output
-    assert (tmp_path / "mine.npz").read_bytes() == before
+    assert (tmp_path / "mine.npz").read_bytes() == content
     assert not (tmp_path / "noext").exists()
 
 
 @pytest.mark.parametrize("form", formats.FORMATS)
 def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path: Path) -> None:
-    own, folder = tmp_path / "mine.npz", tmp_path / "folder"
-    np.savez(own, **own_matrices())
+    file, folder = tmp_path / "mine.npz", tmp_path / "folder"
+    np.savez(file, **own_matrices())
     folder.mkdir()
     formats.FORMATS["mtx"].write(folder, own_matrices())
     scene = folder / "scene.toml"
     scene.write_text("[matrices]\n" + "".join(f'{name} = "{name}.mtx"\n' for name in "KAfg"))
-    before = {path: path.read_bytes() for path in (own, *folder.iterdir())}
+    contents = {path: path.read_bytes() for path in (file, *folder.iterdir())}
     of_folders = form in ("mtx", "abaqus")
-    for given, out in ((own, "/dev/null"), (own, own), (scene if of_folders else own, folder)):
-        done = harness("export", given, "--format", form, "--out", out)
+    for source, out in ((file, "/dev/null"), (file, file), (scene if of_folders else file, folder)):
+        done = harness("export", source, "--format", form, "--out", out)
         assert done.exit_code == 2, done.output
         assert "--out" in done.output or out == folder
     assert Path("/dev/null").is_char_device()
-    assert {path: path.read_bytes() for path in (own, *folder.iterdir())} == before
+    assert {path: path.read_bytes() for path in (file, *folder.iterdir())} == contents
 
 
 # --- DMIG ---------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ import pytest
 from commands import harness
 from small_joints import SCENE
 
-from harness.planning.overrides import Overrides, overridden
 from harness.planning.suite import read_suite
 from problems.errors import InputError
 from problems.load_cases.sweep import sweep
@@ -102,31 +101,11 @@ def test_a_suite_is_bounded(line: str, of_solver: str, tmp_path: Path) -> None:
     assert ".toml" not in line or "without NUL" in str(caught.value)
 
 
-def test_repeats_of_the_command_line_are_bounded() -> None:
-    with pytest.raises(InputError, match="repeats"):
-        overridden(read_suite("gate"), Overrides(repeats=10**11))
-
-
 @pytest.mark.parametrize("values", ["0.1:1.0:1000000000", "0:1:100000", "1:2:-3", "1:2:1e9"])
 def test_sweeps_are_bounded(values: str, tmp_path: Path) -> None:
     texts = [f"initial_gap.mean={values}", "pressure.value=1:2:1000"]
     with pytest.raises(InputError, match=r"at most|FIRST:LAST:COUNT"):
         sweep(read_scene(str(scene_file(tmp_path))), texts)
-
-
-def test_markup_in_a_title_and_in_a_path_is_text(tmp_path: Path) -> None:
-    path = scene_file(tmp_path, ("TITLE", "[/b] [link=x]y")).rename(tmp_path / "[red]x.toml")
-    done = harness("validate", path)
-    assert done.exit_code == 0, done.output
-    assert "[/b] [link=x]y" in done.output
-
-
-def test_a_table_with_a_million_bad_rows_shows_the_first(tmp_path: Path) -> None:
-    (tmp_path / "points.csv").write_text("x,y\n" + "a,b\n" * 3000)
-    done = harness("validate", scene_file(tmp_path, (PRESSURE, f'{FASTENERS}file = "points.csv"')))
-    assert done.exit_code == 2
-    assert "2990 more" in done.output
-    assert done.output.count("line ") == 10
 
 
 MAKE: dict[str, Callable[[Path], object]] = {
@@ -146,7 +125,7 @@ def test_what_is_no_regular_file_is_not_read(kind: str, tmp_path: Path) -> None:
     (tmp_path / "good.toml").write_text(SCENE)
     (tmp_path / "fastened.toml").write_text(fastened)
     (tmp_path / "suite.toml").write_text('plugin = "mine.py"\nscenes = ["scene.toml"]\n')
-    asked = [
+    commands = [
         *("validate scene.toml", "validate own.npz", "validate fastened.toml", "run gate --scene scene.toml"),
         *("solve scene.toml --out new.d", "series scene.toml --out new.d"),
         *(f"series good.toml --gaps {table} --out new.d" for table in tables),
@@ -154,9 +133,9 @@ def test_what_is_no_regular_file_is_not_read(kind: str, tmp_path: Path) -> None:
     if kind == "loop":
         for name in ("mine.py", "out.npz", "loop.d"):
             MAKE[kind](tmp_path / name)
-        asked += ["run suite.toml", "run gate --plugin mine.py", "report loop.d", "gate loop.d"]
-        asked += ["series good.toml --out loop.d", "export good.toml --format npz --out out.npz/file.npz"]
-    for words in asked:
+        commands += ["run suite.toml", "run gate --plugin mine.py", "report loop.d", "gate loop.d"]
+        commands += ["series good.toml --out loop.d", "export good.toml --format npz --out out.npz/file.npz"]
+    for words in commands:
         done = harness(*(str(tmp_path / word) if "." in word else word for word in words.split()))
         assert done.exit_code == 2, words
         assert done.output.strip()

@@ -2,7 +2,6 @@
 
 import signal
 from collections.abc import Iterator
-from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,6 @@ import tiny_joint
 from commands import harness
 from plugin_commands import THREAD, command, interrupt, write
 from plugin_commands import harness as outside
-from rich.console import Console
 from suite_runs import all_end, rows_of
 
 import harness.conformance.isolated as isolated
@@ -109,15 +107,6 @@ def test_an_interrupt_ends_within_a_second(tmp_path: Path, what: str) -> None:
     plugin = write(tmp_path, *(("", begin) if what == "check" else (begin,)))
     arguments = [] if what == "check" else [suite, "--solver", "mine", "--out", tmp_path / "out"]
     interrupt(command(what, *arguments, "--plugin", plugin), tmp_path, go, signal.SIGINT)
-
-
-def test_a_check_that_lasts_says_what_it_is_doing(tmp_path: Path) -> None:
-    terminal, log = StringIO(), StringIO()
-    plugin = write(tmp_path, in_solve="time.sleep(0.05)")
-    assert isolated.run(["mine"], plugin, 20, 1000, Console(file=terminal, force_terminal=True)) == 0
-    assert "mine: dual two parts and a tool" in terminal.getvalue()
-    assert isolated.run(["mine"], plugin, 20, 1000, Console(file=log)) == 0
-    assert log.getvalue() == "mine: no faults\n"
 
 
 #: What breaks the contract, and what is said of it; the last one spoils the cache.

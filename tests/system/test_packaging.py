@@ -59,13 +59,13 @@ def lower_bounds(*without: str) -> dict[str, Version]:
         *project["dependencies"],
         *(line for name, lines in extras if name not in without for line in lines),
     ]
-    found = {}
+    bounds = {}
     for requirement in map(Requirement, stated):
         if requirement.name != "rivetbench":
             (bound,) = requirement.specifier
             assert bound.operator == ">="
-            found[canonicalize_name(requirement.name)] = Version(bound.version)
-    return found
+            bounds[canonicalize_name(requirement.name)] = Version(bound.version)
+    return bounds
 
 
 def pinned(file: str) -> dict[str, Version]:
