@@ -104,20 +104,20 @@ def test_the_recommendation_follows_the_times(tmp_path: Path) -> None:
     assert line["use"] == "honest (dual) 1e-7"
     assert line["seconds"] == pytest.approx(1.28)
     slower = changed(sweep(), "honest", solve_s=50.0)
-    found = advised(results(tmp_path / "b", slower))
-    assert found.loc[1e-7, "use"] == "liar (dual) 1e-10"
-    assert found.loc[1e-9, "use"] == "honest (dual) 1e-9"
+    advice = advised(results(tmp_path / "b", slower))
+    assert advice.loc[1e-7, "use"] == "liar (dual) 1e-10"
+    assert advice.loc[1e-9, "use"] == "honest (dual) 1e-9"
     coarse = [r for r in sweep() if r["solver"] in ("coarse", "late")]
-    found = advised(results(tmp_path / "c", coarse))
-    assert found.loc[1e-3, "use"] == "late (dual) 1e-4"
-    assert found.loc[1e-9, "use"] == "none on every scene"
+    advice = advised(results(tmp_path / "c", coarse))
+    assert advice.loc[1e-3, "use"] == "late (dual) 1e-4"
+    assert advice.loc[1e-9, "use"] == "none on every scene"
 
 
 def test_the_best_of_several_tolerances_stands_for_a_solver(tmp_path: Path) -> None:
-    found = results(tmp_path, sweep())
+    run = results(tmp_path, sweep())
     # honest is within 1e-7 mm from 7 digits on, and the fastest there; liar at 10 digits alone
-    lines = best_tolerances(found.cells).drop_duplicates("label").set_index("method")["tolerance"]
+    lines = best_tolerances(run.cells).drop_duplicates("label").set_index("method")["tolerance"]
     assert lines[["honest (dual)", "liar (dual)"]].tolist() == [1e-7, 1e-10]
-    methods = table(summary.summary(found), "summary").data["method"]
+    methods = table(summary.summary(run), "summary").data["method"]
     assert methods.tolist()[:2] == ["honest (dual)", "liar (dual)"]
     assert methods.is_unique
