@@ -84,23 +84,6 @@ def test_a_damaged_manifest_is_named_with_what_to_do(root: Path, content: bytes 
         storage.load("key")
 
 
-def test_a_writer_that_fails_leaves_nothing(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    save = np.save
-
-    def disk_full(path: Path, array: Any) -> None:
-        if path.name == "two.npy":
-            path.write_bytes(b"half")
-            raise OSError("no space left on device")
-        save(path, array)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(np, "save", disk_full)
-        with pytest.raises(OSError, match="no space"):
-            storage.store("key", ARRAYS, {})
-    assert list(root.iterdir()) == []
-    assert storage.load("key") is None
-
-
 def test_what_a_killed_writer_leaves_is_not_seen(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Looked at from within the writing, after each file."""
     save, seen = np.save, []

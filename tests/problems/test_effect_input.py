@@ -192,11 +192,6 @@ def test_what_may_follow_from_a_bad_row_is_not_said(tmp_path: Path, rows: str, k
     assert [fault.key for fault in faults(tmp_path, GAPS)] == keys
 
 
-def test_a_file_that_is_missing_does_not_hide_other_parameters(tmp_path: Path) -> None:
-    missing, preload = faults(tmp_path, 'kind = "fasteners"\nfile = "holes.csv"\npreload = 0')
-    assert (missing.key, preload.key) == ("effect[0] (fasteners).preload", "file")
-
-
 @pytest.mark.parametrize(
     ("content", "key"),
     [

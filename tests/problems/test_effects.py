@@ -43,12 +43,6 @@ def test_a_fastener_acts_where_it_is(points: list[tuple[float, float]]) -> None:
     assert not on_a[far].any()  # on the nodes of its element alone
 
 
-def test_a_fastener_at_a_node_acts_on_it_alone() -> None:
-    for k, point in enumerate(JOINT.nodes.tolist()):
-        f = Fasteners(kind="fasteners", preload=7.0, points=(tuple(point),)).force(JOINT)
-        assert f[:45].tolist() == [7.0 * (node == k) for node in range(45)]
-
-
 def patterned(**pattern: float) -> Fasteners:
     return Fasteners.model_validate({"kind": "fasteners", "preload": 1.0, "pattern": pattern})
 

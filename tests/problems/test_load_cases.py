@@ -190,7 +190,6 @@ def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, data: Prepared
     ("text", "words"),
     [
         ("fasteners.preload", "KIND.KEY=FIRST:LAST:COUNT"),
-        ("fasteners.preload=1:2", "KIND.KEY=FIRST:LAST:COUNT"),
         ("fasteners.preload=1:2:0", "KIND.KEY=FIRST:LAST:COUNT"),
         ("fasteners.preload=1,nan", "KIND.KEY=FIRST:LAST:COUNT"),
         ("fasteners.load=1:2:3", "one of initial_gap.mean, initial_gap.random.sd, .*fasteners.preload"),

@@ -1,4 +1,4 @@
-"""Problems from outside: printed optima, closed forms, convergence; and how they are found and solved."""
+"""Problems from outside: printed optima, closed forms, convergence."""
 
 import json
 from pathlib import Path
@@ -9,13 +9,10 @@ import scipy.sparse as sp
 from sample_size import ASKED
 from synthetic_results import row, write_rows
 
-from harness.planning.form_choice import chosen_form
 from harness.solving.session import answer_of
 from harness.verification.judge import Reference, judge
 from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
-from problems.errors import InputError
-from problems.forms import FORMS
 from problems.ladders import rung_names
 from problems.ladders.outside import FREE, alone, exact, journal_bearing
 from problems.scene_files import read_scene
@@ -28,7 +25,6 @@ PRINTED = [
     for name in rung_names("outside/")
     if not name.rpartition("/")[2].isdigit() and (ASKED or read_scene(name).expected_size[0] < 5000)
 ]
-LARGE = "outside/torsion/80"
 
 
 def solved(name: str) -> tuple[Reference, float]:
@@ -66,13 +62,6 @@ def test_the_membrane_over_a_hemisphere_converges_to_its_closed_form() -> None:
     assert errors[-1] < errors[0] * 8 / 80  # better than first order
     assert errors == sorted(errors, reverse=True)
     assert abs(radii[-1]) <= 4 / 80
-
-
-def test_a_large_one_is_solved_in_the_sparse_form_by_choice() -> None:
-    assert chosen_form(read_scene(LARGE), FORMS, None).form == "sparse"
-    assert chosen_form(read_scene("outside/torsion/20"), FORMS, None).form == "dual"
-    with pytest.raises(InputError, match="a dual form needs about"):
-        chosen_form(read_scene("outside/torsion/320"), FORMS, "dual")
 
 
 def test_the_matrices_are_those_of_linear_triangles() -> None:

@@ -20,8 +20,6 @@ from problems import scene_files as reading
 from problems.build import load_case, model_of, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
-from problems.effects.supports import Supports
-from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Matrix
 from problems.model.condensation import NotPositiveDefinite, condense
@@ -152,14 +150,6 @@ def test_a_motion_without_energy_is_refused() -> None:
     K = sp.csr_array(sp.block_diag([spring, np.eye(2)]))
     with pytest.raises(NotPositiveDefinite):
         condense(K, [np.array([0, 1]), np.array([2, 3])], np.array([False, False, False, True]))
-
-
-@pytest.mark.parametrize("points", [(), ((30.0, 20.0), (130.0, 40.0), (330.0, 80.0))])  # on one line
-def test_a_part_that_floats_is_refused(points: tuple[tuple[float, float], ...]) -> None:
-    joint = make_joint({"south": LONG}, contacts=[["a", "tool"]])
-    effects = [Supports(kind="supports", part="a", points=points)] if points else []
-    with pytest.raises(InputError, match="held against every rigid motion"):
-        prepared(make_scene(joint, *effects)).assembly.K.ensure_factored()
 
 
 @pytest.mark.parametrize("form", ["dual", "primal", "sparse"])

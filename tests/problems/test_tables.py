@@ -8,14 +8,12 @@ import pytest
 from small_joints import make_joint, make_scene
 
 from problems.effects.fasteners import Fasteners
-from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
 from problems.input.scan_points import crowded, unlike
 from problems.input.tables import TableOptions, read_columns
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
-from problems.load_cases.sweep import sweep
 from problems.model.effect_tables import EffectTable
 
 COLUMNS = ("x", "y", "gap")
@@ -231,15 +229,6 @@ def test_contacts_beyond_a_scan_are_counted() -> None:
     assert "in metres?" in metres
     (away,) = make_scene(JOINT, measured(*((x + 12000, y, gap) for x, y, gap in half))).unusual
     assert "9 of 9, up to 1.2e+04 mm away" in away
-
-
-def test_what_is_said_of_cases_around_a_scan_and_of_a_sweep(tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text("x,y,gap\n0,0,.1\n1,0,.9\n200,60,.5\n")  # too steep for this length
-    around = random_gaps(SCENE, 1, 0, sd=0.1, correlation_length=90.0, around=tmp_path / "scan.csv")
-    assert "their mean misses its points by at most 0.07 mm and is -83.2 to 131 mm" in around.notes[0]
-    gap = InitialGap(kind="initial_gap", mean=0.5)
-    assert "two values, 0,1" in sweep(make_scene(JOINT, gap), ["initial_gap.mean=0,1"]).notes[0]
-    assert sweep(make_scene(JOINT, gap), ["initial_gap.mean=0.1,1"]).notes == ()
 
 
 def test_missing_marks_and_headings_hold_for_a_scan_and_for_gaps(tmp_path: Path) -> None:

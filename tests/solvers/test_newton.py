@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from small_problems import by_nnls, definite
 
-from problems.stiffness.dense_block import product
 from solvers.algorithms.block_pivoting import MAX_STALE_PASSES, _towards, block_pivoting, forces_on
 
 
@@ -20,13 +19,6 @@ def test_the_forces_and_gaps_of_a_set(share: float) -> None:
         assert abs(trial.y[C]).max(initial=0) <= 1e-10
         np.testing.assert_allclose(Q @ trial.lam - p, trial.y, atol=1e-10)
         assert trial.rounding <= 1e-10
-
-
-def test_a_product_with_few_columns() -> None:
-    G = definite(30, seed=6)
-    for count in (0, 1, 7, 8, 30):
-        v = np.where(np.arange(30) < count, 1.5, 0.0)
-        np.testing.assert_allclose(product(G, v), G @ v, atol=1e-12 * abs(G).max())
 
 
 @pytest.mark.parametrize("stale", [0, MAX_STALE_PASSES])
