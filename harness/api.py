@@ -15,7 +15,7 @@ InputError. Matrices are cached as by the command line. Arrays are copied, and t
 """
 
 from harness.commands import load_case_series, plain_arrays, run_comparison, suite_runs
-from harness.commands.load_case_series import SeriesOptions, SeriesOutcome
+from harness.commands.load_case_series import SeriesOutcome
 from harness.commands.suite_runs import SuiteOutcome
 from harness.conformance import check
 from harness.explore.live_answers import Explorer, LiveAnswer, Settings
@@ -28,6 +28,7 @@ from harness.scene import solution
 from harness.scene import validate as checks
 from harness.scene.solution import Solution
 from harness.series.load_case_source import GapCases
+from harness.series.session import SeriesOptions
 from harness.solving.call_lock import in_turn
 from harness.terminal.console import ConsoleReporter
 from harness.verification import gate as gates

@@ -93,8 +93,9 @@ def series(
                 3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with error_reporting() as console:
-        from harness.commands.load_case_series import SeriesOptions, run_series
+        from harness.commands.load_case_series import run_series
         from harness.series.load_case_source import GapCases
+        from harness.series.session import SeriesOptions
         from harness.terminal.console import ConsoleReporter, show_verdict
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)

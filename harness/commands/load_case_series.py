@@ -16,61 +16,15 @@ from harness.results.schema import SERIES
 from harness.scene.allowed_gap import check_series, refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
-from harness.series.session import Job
+from harness.series.session import Job, SeriesOptions
 from harness.terminal import DONE, NOTHING_JUDGED
 from harness.terminal.console import console_of
-from harness.verification.judge import LIMIT_MM
 from problems.errors import Fault, InputError
-from problems.forms import Form
 from problems.load_cases import LoadCases
 from problems.load_cases.sweep import sweep as swept
 from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
-
-
-@dataclass(frozen=True)
-class SeriesOptions:
-    """How the load cases of a series are solved.
-
-    Parameters
-    ----------
-    solver : str
-        Name of a solver, or of the plug-in's.
-    form : str, optional
-        "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
-    tolerance : float
-        Passed to the solver.
-    limit_mm : float
-        Limit on the displacement error, mm.
-    check : int
-        Every `check`-th case is compared with the certified reference; 0: none.
-    threads : int, optional
-        Threads for linear algebra; by default 2, in the sparse form 1.
-    plugin : Path, optional
-        A Python file with a solver. It runs in a process of its own, under the two limits below.
-    time_limit_s : float
-        Time limit per load case of a plug-in, s.
-    memory_limit_mib : int
-        Memory limit over all processes of a plug-in, MiB.
-
-    Examples
-    --------
-    >>> from rivetbench import SeriesOptions
-    >>> SeriesOptions(check=0).solver
-    'newton'
-    """
-
-    solver: str = "newton"
-    form: Form | None = None
-    tolerance: float = 1e-11
-    limit_mm: float = LIMIT_MM
-    check: int = 100
-    threads: int | None = None
-    plugin: Path | None = None
-    time_limit_s: float = 60.0
-    memory_limit_mib: int = 8192
-
 
 STANDARD = SeriesOptions()
 
@@ -181,19 +135,8 @@ def run_series(
     for sentence in (*(read.unusual if isinstance(read, JointScene) else ()), *chosen.notes):
         reporter.say(sentence)
     threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
-    job = Job(
-        scene=read,
-        cases=chosen,
-        solver=solver,
-        form=choice.form,
-        tolerance=options.tolerance,
-        limit_mm=options.limit_mm,
-        check=options.check,
-        threads=threads,
-        plugin=options.plugin,
-        time_limit_s=options.time_limit_s,
-        memory_limit_mib=options.memory_limit_mib,
-    )
+    form_and_threads = {"form": choice.form, "threads": threads}
+    job = Job(**vars(options) | form_and_threads, scene=read, cases=chosen)
     facts = {"solver_version": made.version, "solver_code": made.code}
     code = run(job, facts, directory, console_of(reporter), scheduler)
     verdict: dict[str, Any] = {"kind": "", "said": []}

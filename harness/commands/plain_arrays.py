@@ -238,7 +238,14 @@ def solve_series(
     taken = form_of(name, chosen.forms, form)
     first = cases if isinstance(cases, LoadCases) else Listed(())
     job = Job(
-        scene, first, name, taken, tolerance, limit_mm, check, threads=None, options=dict(options or {})
+        solver=name,
+        tolerance=tolerance,
+        limit_mm=limit_mm,
+        check=check,
+        scene=scene,
+        cases=first,
+        form=taken,
+        solver_options=dict(options or {}),
     )
     session = SeriesSession(job, chosen)
     if isinstance(cases, LoadCases):

@@ -31,7 +31,6 @@ from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from harness.terminal.console import console_of
-from harness.verification.judge import LIMIT_MM
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
@@ -47,7 +46,6 @@ from problems.scene_files import read_scene, scene_of
 RECORD = "place.json"
 SERIES = ("own", "plan")
 OUTPUTS = (RECORD, PLANS, *(f"{name}.{kind}" for name in SERIES for kind in ("toml", "csv")))
-SERIES_TOLERANCE = 1e-11
 HELD_BACK = "Every second row is held back: it does not choose the plan, but says what it keeps"
 
 
@@ -139,7 +137,7 @@ def place(
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
     random = [gap for gap in movable.bare.effects_of(InitialGap) if gap.random]
     single = replace(cases, options=AS_NAMED) == DEFAULT and not random
-    faults = cases.faults()
+    faults = cases.faults(table=None if candidates is None else str(candidates))
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
     if count is not None and not 0 < count <= len(holes):
@@ -193,7 +191,7 @@ def place(
                 table.insert(0, "name", [names.get(place, "") for place in plan])
             csv_frame(table).to_csv(directory / f"{name}.csv", index=False)
             moved, made = _written_scene(directory / f"{name}.toml", study, law, cases_of, result)
-            job = Job(moved, made, "newton", form, SERIES_TOLERANCE, LIMIT_MM, 0, THREADS)
+            job = Job(scene=moved, cases=made, form=form, check=0, threads=THREADS)
             run_series(job, facts, directory / name, console)
         words, passed = sentence_on(result, goal, nodes)
         record = record_of(study, movable.current, holes, goal, result, nodes)

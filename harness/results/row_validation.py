@@ -1,6 +1,6 @@
 """Checks the rows of a file on reading: a file may hold anything."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,11 +40,10 @@ def refuse_wrong_kinds(
         try:
             model.model_validate(row)
         except ValidationError as error:
-            for each in error.errors(include_url=False):
-                name = str(each["loc"][0])
-                faults.append(
-                    Fault(str(path), f"line {number}: {name}", row[name], f"{each['msg']}, or null")
-                )
+            for wrong in error.errors(include_url=False):
+                name = str(wrong["loc"][0])
+                where, allowed = f"line {number}: {name}", f"{wrong['msg']}, or null"
+                faults.append(Fault(str(path), where, row[name], allowed))
         faults += [
             Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
             for name in needed
@@ -63,19 +62,13 @@ def refuse_unreadable(directory: Path) -> None:
     refuse_wrong_kinds(path, rows)
     problems = directory / "problems.jsonl"
     refuse_wrong_kinds(problems, records.read(problems), PROBLEM)
-    _refuse_damaged(
-        directory.glob("machine*.json"),
-        lambda path: records.parsed(regular_file(path, "content", MAX_MIB).read_bytes()),
-    )
-    _refuse_damaged(directory.glob("scenes/*.npz"), records.read_arrays)
-
-
-def _refuse_damaged(paths: Iterable[Path], read: Callable[[Path], object]) -> None:
-    """Raise InputError naming each file that `read` refuses by a ValueError."""
     faults = []
-    for path in sorted(paths):
+    for path in sorted([*directory.glob("machine*.json"), *directory.glob("scenes/*.npz")]):
         try:
-            read(path)
+            if path.suffix == ".npz":
+                records.read_arrays(path)
+            else:
+                records.parsed(regular_file(path, "content", MAX_MIB).read_bytes())
         except ValueError as error:
             faults.append(Fault(str(path), "content", str(error)[:80], "delete it, and run again"))
     if faults:

@@ -4,6 +4,7 @@ A row of measurements.jsonl is one measurement. The harness writes its fields an
 take the names from here. A field that does not apply to a measurement is null.
 """
 
+from dataclasses import dataclass
 from types import NoneType
 from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 
@@ -44,6 +45,44 @@ STEPS = ("convert_s", "prepare_s", "setup_s", "solve_s", "form_s")
 
 #: Who stands behind a solver, in the order of every table.
 OWNERS = ("ours", "textbook", "library")
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The judge's figures on an answer; one that does not apply is None.
+
+    The formulas are in harness/verification/judge.py.
+
+    Parameters
+    ----------
+    verdict : str
+        "within" or "outside" the limit, "cannot_be_judged" or "no_answer".
+    reference_bound_mm, displacement_error_mm : float, optional
+        Proven error bound of the reference, and the distance of the answer to it, mm.
+    contact_mismatch : int, optional
+        Contacts open or closed by mistake.
+    min_gap_mm, primal_residual : float, optional
+        The smallest gap, and the largest overlap, mm.
+    dual_residual : float, optional
+        The largest unbalanced or pulling force, N.
+    duality_gap : float, optional
+        The primal minus the dual objective, N·mm.
+    backward_error : float, optional
+        Residual of the optimality conditions relative to their terms.
+    objective : float, optional
+        The primal objective, N·mm.
+    """
+
+    verdict: Verdict
+    reference_bound_mm: float | None = None
+    displacement_error_mm: float | None = None
+    contact_mismatch: int | None = None
+    min_gap_mm: float | None = None
+    primal_residual: float | None = None
+    dual_residual: float | None = None
+    duality_gap: float | None = None
+    backward_error: float | None = None
+    objective: float | None = None
 
 
 class Report(TypedDict, total=False):
@@ -89,7 +128,7 @@ class Origin(Provenance):
 
 
 class MeasurementRow(Report, Origin, total=False):
-    """A row of measurements.jsonl, with the fields of the judge (harness/verification/judge.py)."""
+    """A row of measurements.jsonl, without the fields of its Judgement."""
 
     key: str  # identity of the measurement
     suite: str
@@ -118,46 +157,11 @@ class MeasurementRow(Report, Origin, total=False):
     active: int  # contacts closed
     scene_key: str  # a hash of what the scene is made of
 
-    verdict: Verdict
-    reference_bound_mm: float | None
-    displacement_error_mm: float | None
-    contact_mismatch: int | None
-    min_gap_mm: float | None
-    primal_residual: float | None
-    dual_residual: float | None
-    duality_gap: float | None
-    backward_error: float | None
-    objective: float | None
-
     solver_version: str
     solver_code: str  # a hash of this project's code for the solver
     rivetbench_version: str
     recorded_at: str
     overhead_s: float | None  # of the measurement, beside load_s and the steps
-
-
-class ProblemRow(TypedDict, total=False):
-    """A row of problems.jsonl: a scene and its reference."""
-
-    scene: str
-    title: str
-    scene_key: str
-    n: int
-    m: int
-    active: int
-    cond_K: float | None
-    lambda_min: float | None
-    lambda_max: float | None
-    build_s: dict[str, float] | None  # by step, see BUILDING
-    stored_mib: dict[str, float]
-    reference_s: float
-    reference_bound_mm: float
-    reference_route: str
-    sparse: dict[str, Any]  # the facts of a reference in the sparse form
-    refused: str  # of a rung that the model should refuse: its message, "" if it is accepted
-    printed_objective: float
-    printed_digits: int
-    printed_source: str
 
 
 #: The kind of a field in JSON. An object's names depend on the solver, the series or the scene.
@@ -177,7 +181,16 @@ def kinds(row: type) -> dict[str, Kind]:
     return {name: KINDS[get_origin(one) or one] for name, one in types.items()}
 
 
-FIELDS, PROBLEM_FIELDS = kinds(MeasurementRow), kinds(ProblemRow)
+FIELDS = kinds(MeasurementRow) | kinds(Judgement)
+#: Of a row of problems.jsonl, a scene and its reference. build_s : by step, see BUILDING. sparse : the facts
+#: of a reference in the sparse form. refused : the message for a rung that the model should refuse, "" if it
+#: is accepted.
+PROBLEM_FIELDS: dict[str, Kind] = {
+    **dict.fromkeys(("scene", "title", "scene_key", "reference_route", "refused", "printed_source"), "text"),
+    **dict.fromkeys(("n", "m", "active", "cond_K", "lambda_min", "lambda_max", "reference_s"), "number"),
+    **dict.fromkeys(("reference_bound_mm", "printed_objective", "printed_digits"), "number"),
+    **dict.fromkeys(("build_s", "stored_mib", "sparse"), "object"),
+}
 MEASURED = tuple(kinds(Report))
 
 #: The steps of `build_s` by the stage that they make in the dense forms; the sparse form has one, `model`.

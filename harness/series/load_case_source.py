@@ -52,19 +52,20 @@ class GapCases:
     gaps: Path | None = None
     options: TableOptions = AS_NAMED
 
-    @property
-    def random_options(self) -> list[str]:
-        """The options given that belong to random gaps alone."""
+    def faults(self, sweep: Sequence[str] = (), table: str | None = None) -> list[Fault]:
+        """A fault if the cases come from more than one source, or no table has headings. table : another that
+        is read by the options.
+        """
         names = ("seed", "mean", "sd", "correlation_length", "around")
-        return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
-
-    def faults(self, sweep: Sequence[str] = ()) -> list[Fault]:
-        """A fault if the cases come from more than one source."""
-        sources = ["--gaps"] * bool(self.gaps), ["--sweep"] * bool(sweep), self.random_options
-        if sum(map(bool, sources)) < 2:
-            return []
-        allowed = "random gaps, --gaps or --sweep" if sweep else "random gaps or --gaps"
-        return [Fault("cases", "given", " ".join(chain(*sources)), allowed)]
+        random = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
+        sources, faults = (["--gaps"] * bool(self.gaps), ["--sweep"] * bool(sweep), random), []
+        if self.options.columns and not (self.around or table):
+            allowed = "those of --around; the columns of --gaps are the contacts, in their order"
+            faults.append(Fault("--columns", "headings", ", ".join(self.options.columns), allowed))
+        if sum(map(bool, sources)) > 1:
+            allowed = "random gaps, --gaps or --sweep" if sweep else "random gaps or --gaps"
+            faults.append(Fault("cases", "given", " ".join(chain(*sources)), allowed))
+        return faults
 
     def of(self, scene: Scene, form: Form) -> LoadCases:
         """The load cases of a scene. Raises InputError, as `measured_gaps` and `random_gaps` do."""

@@ -84,7 +84,7 @@ def identity(job: Job) -> dict[str, Any]:
         "scene_key": job.scene.key,
         "cases_key": job.cases.key,
         "solver": job.solver,
-        "options": job.options,
+        "options": job.solver_options,
         "form": job.form,
         "tolerance": job.tolerance,
         "limit_mm": job.limit_mm,

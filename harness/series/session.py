@@ -18,7 +18,7 @@ from harness.results.records import Row
 from harness.results.series_file import Gaps
 from harness.solving.session import SolverSession
 from harness.verification.assess import Assessment, GapError, assess
-from harness.verification.judge import judge
+from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import best_of_candidates, proof_of
 from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
@@ -41,25 +41,56 @@ Report = Callable[..., None]
 
 
 @dataclass(frozen=True)
-class Job:
-    """The cases of a series, and how they are solved.
+class SeriesOptions:
+    """How the load cases of a series are solved.
 
-    check : every check-th case is compared with the reference; 0: none. threads : None: as they are.
-    time_limit_s : per case, and memory_limit_mib, over all its processes: of a plug-in (places.py).
+    Parameters
+    ----------
+    solver : str
+        Name of a solver, or of the plug-in's.
+    form : str, optional
+        "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
+    tolerance : float
+        Passed to the solver.
+    limit_mm : float
+        Limit on the displacement error, mm.
+    check : int
+        Every `check`-th case is compared with the certified reference; 0: none.
+    threads : int, optional
+        Threads for linear algebra; by default 2, in the sparse form 1.
+    plugin : Path, optional
+        A Python file with a solver. It runs in a process of its own, under the two limits below.
+    time_limit_s : float
+        Time limit per load case of a plug-in, s.
+    memory_limit_mib : int
+        Memory limit over all processes of a plug-in, MiB.
+
+    Examples
+    --------
+    >>> from rivetbench import SeriesOptions
+    >>> SeriesOptions(check=0).solver
+    'newton'
     """
 
-    scene: Scene
-    cases: LoadCases
-    solver: str
-    form: Form
-    tolerance: float
-    limit_mm: float
-    check: int
-    threads: int | None
-    options: dict[str, Any] = field(default_factory=dict)
+    solver: str = "newton"
+    form: Form | None = None
+    tolerance: float = 1e-11
+    limit_mm: float = LIMIT_MM
+    check: int = 100
+    threads: int | None = None
     plugin: Path | None = None
     time_limit_s: float = 60.0
     memory_limit_mib: int = 8192
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job(SeriesOptions):
+    """The cases of a series, and how they are solved. threads : None: as they are."""
+
+    scene: Scene
+    cases: LoadCases
+    form: Form
+    solver_options: dict[str, Any] = field(default_factory=dict)
     key: str = field(default_factory=lambda: uuid4().hex)
 
 
@@ -97,7 +128,7 @@ class SeriesSession(Reporter):
         self.proof = proof_of(self.data)
         self.gap_error = GapError.of(self.data.assembly)
         self.problem = in_form(self.data, job.form)
-        solver = solver or make_solver(job.solver, job.options, job.plugin)
+        solver = solver or make_solver(job.solver, job.solver_options, job.plugin)
         self.row: Row = {}  # of the case being solved
         self.session = SolverSession(solver, self.problem, job.tolerance, self, KEPT_ANSWERS)
         self.session.open(batched=True)

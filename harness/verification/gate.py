@@ -25,6 +25,7 @@ from harness.terminal.console import STYLES
 from problems.errors import Fault, InputError
 from problems.forms import form_family
 from problems.input.bounded_types import validation_faults
+from report.document.numbers import counted, out_of
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
@@ -106,7 +107,7 @@ def gate(
     >>> change = Overrides(scenes=("gallery/three-part-stack",), solvers=("gi",), forms=("dual",))
     >>> outcome = run("gate", "results/gi", change)
     >>> gate("results/gi").sentences
-    ('Passed: all 1 gated rows are within 1e-07 mm.',)
+    ('Passed: 1 gated row is within 1e-07 mm.',)
     """
     folder, base = Path(directory), Path(baseline) if baseline else None
     if not folder.is_dir():
@@ -135,14 +136,15 @@ def concluded(findings: list[Finding], baseline: Baseline | None) -> tuple[int, 
         return NOTHING_JUDGED, ("Nothing could be judged: no gated row has an answer that can be.",)
     failed = sum(not finding.passed for finding in findings)
     if failed:
-        return FAILED, (f"Accuracy lost: {failed} of {len(findings)} gated rows.",)
+        return FAILED, (f"Accuracy lost: {out_of(failed, len(findings), 'gated row')}.",)
     compared = sum(finding.baseline_mm is not None for finding in findings)
     if baseline and not compared:
         why = f"no gated row has an error within its limit in {baseline.name}"
         return NOTHING_JUDGED, (f"Nothing could be compared: {why}.",)
     wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
-    passed = f"Passed: all {len(findings)} gated rows are within {limits}."
+    rows = counted(len(findings), "gated row")
+    passed = f"Passed: {f'all {rows} are' if len(findings) > 1 else f'{rows} is'} within {limits}."
     if not baseline:
         return DONE, (passed,)
     times = f"none exceeds its error there {baseline.margin:g} times"

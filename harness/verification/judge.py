@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.results.schema import Verdict
+from harness.results.schema import Judgement, Verdict
 from problems.forms.assembly import LoadCase, Mask, Vector
 from problems.forms.prepared import Prepared
 
@@ -48,42 +48,6 @@ class Reference:
     route: str
     unit_mm: Vector | float = 1.0
     gap_unit_mm: Vector | float = 1.0
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """The judge's figures on an answer; one that does not apply is None. The formulas are in this file.
-
-    Parameters
-    ----------
-    verdict : str
-        "within" or "outside" the limit, "cannot_be_judged" or "no_answer".
-    reference_bound_mm, displacement_error_mm : float, optional
-        Proven error bound of the reference, and the distance of the answer to it, mm.
-    contact_mismatch : int, optional
-        Contacts open or closed by mistake.
-    min_gap_mm, primal_residual : float, optional
-        The smallest gap, and the largest overlap, mm.
-    dual_residual : float, optional
-        The largest unbalanced or pulling force, N.
-    duality_gap : float, optional
-        The primal minus the dual objective, N·mm.
-    backward_error : float, optional
-        Residual of the optimality conditions relative to their terms.
-    objective : float, optional
-        The primal objective, N·mm.
-    """
-
-    verdict: Verdict
-    reference_bound_mm: float | None = None
-    displacement_error_mm: float | None = None
-    contact_mismatch: int | None = None
-    min_gap_mm: float | None = None
-    primal_residual: float | None = None
-    dual_residual: float | None = None
-    duality_gap: float | None = None
-    backward_error: float | None = None
-    objective: float | None = None
 
 
 def conditioned_limit(limit_mm: float, cond_K: float, largest_mm: float) -> float:

@@ -125,7 +125,7 @@ def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> 
     suite = read_suite(str(tiny_joint.write_suite(tmp_path, '[[solver]]\nname = "newton"\n')))
     said_by(run_suite, suite, tmp_path / "suite")
     scene = read_scene(str(write_strip(tmp_path)))
-    job = Job(scene, random_gaps(scene, 3, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)
+    job = Job(scene=scene, cases=random_gaps(scene, 3, 0), form="dual", check=0, threads=1)
     said_by(run_series, job, {}, tmp_path / "series")
     rows = [*rows_of(tmp_path / "suite"), *series_file.rows(tmp_path / "series")]
     assert len(rows) == 4

@@ -57,7 +57,7 @@ needs_dask = pytest.mark.skipif(not DASK, reason="needs Dask")
 @pytest.fixture
 def job(tmp_path: Path) -> Job:
     scene = read_scene(str(write_strip(tmp_path)))
-    return Job(scene, random_gaps(scene, CASES, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)
+    return Job(scene=scene, cases=random_gaps(scene, CASES, 0), form="dual", check=0, threads=1)
 
 
 def pids(cluster: Any) -> list[int]:
@@ -241,7 +241,7 @@ def test_a_table_is_solved_on_workers_a_case_each_row(cluster: Any, tmp_path: Pa
     scene = read_scene(str(write_strip(tmp_path)))
     np.save(tmp_path / "gaps.npy", np.random.default_rng(0).uniform(0, 0.5, (30, 45)))
     table = measured_gaps(scene, tmp_path / "gaps.npy")
-    job = Job(scene, table, "newton", "dual", 1e-11, 1e-7, 0, 1)
+    job = Job(scene=scene, cases=table, form="dual", check=0, threads=1)
     alone, out = tmp_path / "alone", tmp_path / "out"
     assert run(job, {}, alone, quiet()) == 0
     assert run(job, {}, out, quiet()) == 0

@@ -207,11 +207,14 @@ def test_what_cannot_be_together_is_said_at_once() -> None:
     assert "newton takes dual" in ended.output
     assert not Path("none").exists()
     series("--sweep", "initial_gap.mean=1:2:3", "--cases", "5", "--out", "none", code=2)
+    ended = series("--gaps", "gaps.csv", "--columns", "X,Y,Gap", "--out", "none", code=2)
+    assert "--columns: headings = 'X, Y, Gap'" in ended.output
 
 
 def results_of(count: int, check: int, **solver: Any) -> list[Result]:
     scene = read_scene("strip.toml")
-    job = Job(scene, random_gaps(scene, count, 0), "faulty", "dual", 1e-9, 1e-7, check, 1, **solver)
+    how: Any = {"tolerance": 1e-9, "check": check, "threads": 1, "form": "dual"} | solver
+    job = Job("faulty", scene=scene, cases=random_gaps(scene, count, 0), **how)
     return [result for results in SeriesSession(job).solve(range(count)) for result in results]
 
 
@@ -225,7 +228,7 @@ def results_of(count: int, check: int, **solver: Any) -> list[Result]:
 )
 def test_a_solver_that_fails_is_a_row(fault: str, verdicts: list[str]) -> None:
     Path("faulty.py").write_text(tiny_joint.FAULTY)
-    results = results_of(4, 2, options={"fault": fault}, plugin=Path("faulty.py"))
+    results = results_of(4, 2, solver_options={"fault": fault}, plugin=Path("faulty.py"))
     assert [result.row["verdict"] for result in results] == verdicts
     assert all((result.gap is None) == (result.row["verdict"] == "no_answer") for result in results)
     assert fault != "raises" or "ValueError: no step" in results[0].row["message"]
@@ -240,7 +243,7 @@ def test_what_p_has_lost_in_rounding_is_in_the_bound(monkeypatch: pytest.MonkeyP
         return [replace(load, p=load.p + 1e-6 * rng.standard_normal(45)) for load in loads(self, cases)]
 
     monkeypatch.setattr(Dual, "loads", spoilt)
-    job = Job(scene, random_gaps(scene, 9, 0), "newton", "dual", 1e-11, 1e-5, 1, 1)
+    job = Job(scene=scene, cases=random_gaps(scene, 9, 0), form="dual", limit_mm=1e-5, check=1, threads=1)
     (results,) = SeriesSession(job).solve(range(9))
     for row in (result.row for result in results):
         assert row["verdict"] == "within"
