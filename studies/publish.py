@@ -27,7 +27,7 @@ from PIL import Image
 from harness.planning.suite import read_suite
 from harness.results import records, series_file
 from harness.results.answer_files import pack
-from harness.results.provenance import ROOT, commit
+from harness.results.provenance import ROOT, provenance
 from harness.results.schema import OWNERS, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.terminal import INTERRUPTED
@@ -74,11 +74,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"unknown: {', '.join(unknown)}")
     failed: list[str] = []
     if not chosen.index:
-        digits, clean = commit()
-        if not clean or Path.cwd().resolve() != ROOT:
+        code = provenance()
+        if not code["clean"] or Path.cwd().resolve() != ROOT:
             parser.error(f"must run in {ROOT}, a clone whose code is as committed")
         try:
-            failed = measure([name for name in NAMES if not chosen.names or name in chosen.names], digits)
+            failed = measure(
+                [name for name in NAMES if not chosen.names or name in chosen.names], code["commit"]
+            )
         except KeyboardInterrupt:
             return INTERRUPTED
     print(f"Index: {write_index(PUBLISHED)}")

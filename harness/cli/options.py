@@ -99,11 +99,9 @@ def error_reporting(
         line = error.object.split("\n")[where][:LONGEST_LINE]
         errors.print(f"{line}: a name that is not UTF-8 cannot be written: rename the file", style="red")
         raise typer.Exit(WRONG_USAGE) from None
-    except OSError as error:
-        errors.print(f"{error}{safe}", style="red")
-        raise typer.Exit(WRONG_USAGE) from None
-    except MemoryError as error:
-        errors.print(f"Not enough memory: {error}{safe}", style="red")
+    except (OSError, MemoryError) as error:
+        why = "Not enough memory: " if isinstance(error, MemoryError) else ""
+        errors.print(f"{why}{error}{safe}", style="red")
         raise typer.Exit(WRONG_USAGE) from None
     except KeyboardInterrupt:
         errors.print(interrupted, style="yellow")

@@ -95,14 +95,6 @@ class Run(Reporter):
         self.measurements, self.answers, self.first = measurements, answers, measurements[0]
         self.events = events
 
-    def report(self, fields: Report) -> None:
-        """Report fields of the row of the current load case."""
-        self.events.report(**fields)
-
-    def begin_phase(self, phase: str) -> None:
-        """Start the clock of the limit of a phase of `measure`."""
-        self.events.report(phase=phase)
-
     @contextmanager
     def step(self, name: str, more_s: float = 0.0) -> Iterator[None]:
         """Report the seconds of a step, and some more, under its name."""
@@ -123,7 +115,7 @@ class Run(Reporter):
             start = time.perf_counter()
             cases = list(load_cases(scene, self.measurements))
             if problem.prepared.model_s is not None:
-                self.report({"model_s": problem.prepared.model_s + time.perf_counter() - start})
+                self.events.report(model_s=problem.prepared.model_s + time.perf_counter() - start)
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
         session = SolverSession(solver, problem, m.tolerance, self)
@@ -182,9 +174,9 @@ class Run(Reporter):
 
     def begin(self, session: SolverSession) -> None:
         """Start the clock of the solver; before the first load case, convert and prepare."""
-        self.begin_phase("solve")
+        self.events.report(phase="solve")
         if not session.opened:
-            self.report({"data_mib": resident_mib("VmRSS")})
+            self.events.report(data_mib=resident_mib("VmRSS"))
             session.open(batched=self.first.entry.batched is not None)
 
     def saved(
@@ -193,10 +185,10 @@ class Run(Reporter):
         """Report the figures of an answer, and save it: the last event."""
         stages = " ".join(problem.prepared.opened)
         peak = resident_mib("VmHWM")
-        self.begin_phase("save")
-        self.report({**fields, **threads_in_effect(), "peak_rss_mib": peak, "stages": stages})
+        self.events.report(phase="save")
+        self.events.report(**{**fields, **threads_in_effect(), "peak_rss_mib": peak, "stages": stages})
         if self.first.suite.yardstick and problem.yardstick is not None:
-            self.report(yardstick(problem.yardstick))
+            self.events.report(**yardstick(problem.yardstick))
         if x is None:
             return {"status": answer.status, "answer": None}
         try:

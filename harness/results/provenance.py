@@ -25,30 +25,18 @@ HOOK_VARIABLES = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR"
 
 
 def provenance() -> Provenance:
-    """The commit of this code, and whether it has no other changes, as every row names them."""
-    name, clean = commit()
-    return {"commit": name, "clean": clean}
-
-
-def commit() -> tuple[str, bool | None]:
-    """The commit of the code in these packages, and whether the code is as committed.
+    """The commit of the code in these packages, and whether the code is as committed: in every row.
 
     In a git work tree of the project: the 40 hexadecimal digits of the last commit that touched CODE (commits
     to documents or results do not count), and whether CODE has no changes. An untracked file is a change,
     because plug-ins are found by discovery. Without such a work tree or git: the version, and None.
     """
-    return _of_work_tree() or (__version__, None)
-
-
-def _of_work_tree() -> tuple[str, bool | None] | None:
-    prefix = _git("rev-parse", "--show-prefix")
-    if prefix is None or _git("ls-files", "--error-unmatch", "--", *OWN_FILES) is None:
-        return None
-    digits = _git("log", "-1", "--format=%H", "--", *CODE)
-    if prefix.strip() or not digits:  # in a subfolder, the work tree is another project's; or no commit yet
-        return None
+    prefix = _git("rev-parse", "--show-prefix")  # not empty in a work tree of another project
+    ours = prefix == "\n" and _git("ls-files", "--error-unmatch", "--", *OWN_FILES) is not None
+    if not (ours and (digits := _git("log", "-1", "--format=%H", "--", *CODE))):
+        return {"commit": __version__, "clean": None}
     changes = _git("status", "--porcelain", "--untracked-files=all", "--", *CODE)
-    return digits.strip(), None if changes is None else not changes
+    return {"commit": digits.strip(), "clean": None if changes is None else not changes}
 
 
 def _git(*arguments: str) -> str | None:

@@ -25,7 +25,7 @@ from harness.planning.form_choice import chosen_form
 from harness.results.atomic_output import atomic_output, refuse_unwritable
 from harness.terminal.console import console_of
 from harness.verification.judge import LIMIT_MM
-from harness.verification.reference_problem import ReferenceProblem, opened, reference_problem
+from harness.verification.reference_problem import ReferenceProblem, measurable, opened
 from problems import formats
 from problems.errors import Fault, InputError
 from problems.forms import FORMS, Form
@@ -140,7 +140,7 @@ def _program(
     does not fit into the memory of this machine.
     """
     chosen_form(scene, FORMS, form)
-    judged = reference_problem(source, limit_s=limit_s, form=form) if with_reference else opened(scene, form)
+    judged = measurable(source, limit_s=limit_s, form=form) if with_reference else opened(scene, form)
     problem = in_form(judged.prepared, form)
     (load,) = problem.loads([judged.load])
     blocks = problem.blocks

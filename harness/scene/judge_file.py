@@ -13,7 +13,7 @@ from harness.results.comparison import Incomparable
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from harness.verification.judge import Judgement
-from harness.verification.reference_problem import ReferenceProblem, reference_problem
+from harness.verification.reference_problem import ReferenceProblem, measurable
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Vector
@@ -45,7 +45,7 @@ def judge_file(
     if not 0 < limit_mm < inf:
         raise InputError.one("--limit", "limit, mm", limit_mm, "must be positive and finite")
     answer = read_answer(path)
-    problem = reference_problem(source, limit_s=reference_limit_s, form=form)
+    problem = measurable(source, limit_s=reference_limit_s, form=form)
     assembly = problem.prepared.assembly
     for name, size in (("x", assembly.n), ("lam", assembly.m)):
         if name in answer and len(answer[name]) != size:

@@ -15,6 +15,7 @@ from problems.forms.problem import Problem
 from solvers.base import Answer, Status
 
 LARGEST_COUNT = 2**53  # every reader of JSON keeps integers up to it
+COUNT = "a whole number from 0 to 2⁵³"
 LARGEST_DETAILS = 2**16  # characters of JSON; larger ones are dropped
 LONGEST_SHOWN = 80  # characters of a value in a message
 LONGEST_ERROR = 2000  # characters of an exception's text
@@ -63,9 +64,9 @@ def examined(answer: object, problem: Problem) -> tuple[Answer, list[InvalidAnsw
         plain(_status, answer.status),
         plain(vector, "lam", answer.lam, problem.assembly.m),
         plain(vector, "x", answer.x, problem.assembly.n),
-        plain(_count, "iterations", answer.iterations),
-        plain(_count, "inner_iterations", answer.inner_iterations),
-        plain(_seconds, "reported_s", answer.reported_s),
+        plain(_number, "iterations", answer.iterations, Integral, COUNT),
+        plain(_number, "inner_iterations", answer.inner_iterations, Integral, COUNT),
+        plain(_number, "reported_s", answer.reported_s, Real, "seconds"),
         plain(_plain, answer.details),
     )
     return converted, faults
@@ -102,21 +103,13 @@ def vector(name: str, value: Any, size: int) -> Vector | None:
     return plain
 
 
-def _count(name: str, value: Any) -> int | None:
-    if value is not None and not _within(value, Integral):
-        wrong = f"{name} is {shown(value)}; wanted a whole number from 0 to 2⁵³"
-        raise InvalidAnswer(wrong, "Give a whole number, or None")
-    return None if value is None else int(value)
-
-
-def _seconds(name: str, value: Any) -> float | None:
-    if value is not None and not _within(value, Real):
-        raise InvalidAnswer(f"{name} is {shown(value)}; wanted seconds", "Give seconds as a float, or None")
-    return None if value is None else float(value)
-
-
-def _within(value: Any, kind: Any) -> bool:
-    return isinstance(value, kind) and bool(0 <= value < LARGEST_COUNT)
+def _number(name: str, value: Any, kind: Any, wanted: str) -> Any:
+    """A number of a kind, from 0 to 2⁵³; None for None."""
+    if value is None:
+        return None
+    if not (isinstance(value, kind) and 0 <= value < LARGEST_COUNT):
+        raise InvalidAnswer(f"{name} is {shown(value)}; wanted {wanted}", f"Give {wanted}, or None")
+    return int(value) if kind is Integral else float(value)
 
 
 def shown(value: object) -> str:

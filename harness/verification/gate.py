@@ -6,10 +6,10 @@ data and the reference are made from the scene.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import ValidationError
+from pydantic import Field, create_model
 from rich.console import Console
 from rich.table import Table
 
@@ -19,21 +19,27 @@ from harness.results import records
 from harness.results.answer_files import is_kept
 from harness.results.atomic_output import refuse_outputs
 from harness.results.records import Row
-from harness.results.row_validation import refuse_wrong_kinds
+from harness.results.row_validation import MEASUREMENT, refuse_wrong_kinds
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
-from problems.errors import Fault, InputError
+from problems.errors import InputError
 from problems.forms import form_family
-from problems.input.bounded_types import validation_faults
+from problems.input.bounded_types import Positive
 from report.document.numbers import counted, out_of
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
-from .reference_problem import ReferenceProblem, reference_problem
+from .reference_problem import ReferenceProblem, measurable
 
 #: What the gate reads of a row: which answer belongs to which scene.
 NEEDED = ("key", "source", "scene_key", "form", "status", "gated", "limit_mm")
-MAX_CASES = 10**9
+GATED = create_model(
+    "Gated",
+    __base__=MEASUREMENT,
+    limit_mm=(Positive | None, None),
+    case=(Annotated[int, Field(ge=0, lt=10**9)] | None, None),
+    series=(RandomCases | None, None),
+)
 UNREADABLE = "is missing, damaged or not finite"
 
 #: The files of a run that no output may replace.
@@ -164,23 +170,7 @@ def show(outcome: GateOutcome, console: Console) -> int:
 def gated_rows(path: Path) -> dict[str, Row]:
     """The gated rows by key. Raises InputError if a field is missing, of another kind or out of bounds."""
     rows = records.read(path)
-    refuse_wrong_kinds(path, rows, needed=NEEDED)
-    faults = []
-    for number, row in enumerate(rows, start=1):
-        if not 0 < row["limit_mm"] < inf:
-            allowed = "must be positive and finite"
-            faults.append(Fault(str(path), f"line {number}: limit_mm", row["limit_mm"], allowed))
-        case = row.get("case")
-        if case is not None and not (type(case) is int and 0 <= case < MAX_CASES):
-            allowed = f"an integer from 0 to {MAX_CASES - 1}"
-            faults.append(Fault(str(path), f"line {number}: case", case, allowed))
-        if row.get("series") is not None:
-            try:
-                RandomCases.model_validate(row["series"])
-            except ValidationError as error:
-                faults += validation_faults(path, RandomCases, error, f"line {number}: series")
-    if faults:
-        raise InputError(faults)
+    refuse_wrong_kinds(path, rows, GATED, NEEDED)
     return {row["key"]: row for row in rows if row["gated"]}
 
 
@@ -200,7 +190,7 @@ def judged(
             continue
         wanted = row["source"], form_family(row["form"])
         if problem is None or wanted != opened:
-            problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
+            problem, opened = measurable(row["source"], limit_s=limit_s, form=row["form"]), wanted
         finding = judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
         yield baseline.compared(row, finding) if baseline else finding
 

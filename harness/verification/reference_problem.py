@@ -133,17 +133,6 @@ def measurable(
     return problem
 
 
-def reference_problem(
-    source: str,
-    limit_s: float | None = None,
-    form: Form = "dual",
-) -> ReferenceProblem:
-    """Open or build a scene and prove its reference. Raises InputError as `measurable` does."""
-    problem = measurable(source, limit_s=limit_s, form=form)
-    _ = problem.reference
-    return problem
-
-
 def record(problem: ReferenceProblem, directory: Path) -> None:
     """Put the scene into DIRECTORY/problems.jsonl and its contacts into DIRECTORY/scenes/NAME.npz.
 

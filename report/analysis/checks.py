@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 
 import pandas as pd
 
-from harness.results.provenance import commit
+from harness.results.provenance import provenance
 from report.document.numbers import counted, listed
 from report.results.reader import Results
 
@@ -56,7 +56,7 @@ def code_warnings(rows: pd.DataFrame) -> list[str]:
         doubts.append(f"{which} measured with uncommitted changes to that commit.")
     if mixed := _several(rows, "solver_code"):
         doubts.append(f"The tables mix rows of different code of {listed([*mixed])}.")
-    if other := int((~commits.isin(["", commit()[0]])).sum()):
+    if other := int((~commits.isin(["", provenance()["commit"]])).sum()):
         which = "All rows were" if other == len(rows) else f"{other} of {len(rows)} rows {_was(other)}"
         doubts.append(f"{which} measured with older code than the code that drew this report.")
     return doubts

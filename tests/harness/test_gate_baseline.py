@@ -42,7 +42,7 @@ def test_lost_digits_are_reported(finished: Path, copy: Path, shift: float, marg
 
 def test_no_scene_is_opened_without_kept_answers(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.rmtree(copy / "answers")
-    monkeypatch.setattr("harness.verification.gate.reference_problem", None)
+    monkeypatch.setattr("harness.verification.gate.measurable", None)
     done = gate(copy)
     assert done.exit_code == 3, done.output
     assert "Nothing could be judged" in done.output

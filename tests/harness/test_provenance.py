@@ -15,7 +15,7 @@ from suite_runs import rows_of, said_by
 from harness.measurement.suite_run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
-from harness.results.provenance import HOOK_VARIABLES, ROOT, commit
+from harness.results.provenance import HOOK_VARIABLES, ROOT, provenance
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from problems import __version__
@@ -26,7 +26,7 @@ COPIED = (
     *("problems/__init__.py", "harness/__init__.py", "harness/results/__init__.py"),
     *("harness/results/provenance.py", "harness/results/schema.py", "pyproject.toml"),
 )
-ASK = "from harness.results.provenance import commit; import json; print(json.dumps(commit()))"
+ASK = "from harness.results.provenance import provenance as p; import json; print(json.dumps(p()))"
 NOT_KNOWN = (__version__, None)
 
 
@@ -65,8 +65,8 @@ def code_of(folder: Path, **environment: str) -> tuple[str, bool | None]:
     done = subprocess.run(
         [sys.executable, "-P", "-c", ASK], env=variables, check=True, capture_output=True, cwd=folder.parent
     )
-    name, clean = json.loads(done.stdout)
-    return name, clean
+    said = json.loads(done.stdout)
+    return said["commit"], said["clean"]
 
 
 def test_a_commit_of_documents_or_results_is_no_other_code(tree: Path) -> None:
@@ -121,7 +121,7 @@ def test_the_repository_of_another_project_is_not_ours(tmp_path: Path, tracked: 
 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:
-    here = dict(zip(("commit", "clean"), commit(), strict=True))
+    here = provenance()
     suite = read_suite(str(tiny_joint.write_suite(tmp_path, '[[solver]]\nname = "newton"\n')))
     said_by(run_suite, suite, tmp_path / "suite")
     scene = read_scene(str(write_strip(tmp_path)))

@@ -13,7 +13,7 @@ from harness.measurement.suite_run import run
 from harness.planning.suite import read_suite
 from harness.results import records
 from harness.verification.gate import gate
-from harness.verification.reference_problem import measurable, record, reference_problem
+from harness.verification.reference_problem import measurable, record
 from problems.forms import Form
 
 pytestmark = pytest.mark.slow
@@ -80,7 +80,7 @@ def test_reference_from_first_answer(named: str, tmp_path: Path, monkeypatch: py
     """Not from one that is cut off, nor from one with NaN."""
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     path = str(write_strip(tmp_path))
-    lam = reference_problem(path).reference.lam
+    lam = measurable(path).reference.lam
     problem = measurable(path, form="sparse")
     for bad in (lam[:-1], np.where(lam > 0, np.nan, lam), *([lam] if named == "mine" else [])):
         np.savez(tmp_path / "answer.npz", x=np.zeros(216), lam=bad)
@@ -94,7 +94,7 @@ def test_both_roads_are_recorded_in_either_order(order: tuple[Form, ...], tmp_pa
     path = str(write_strip(tmp_path))
     (tmp_path / "scenes").mkdir()
     for form in order:
-        record(reference_problem(path, form=form), tmp_path)
+        record(measurable(path, form=form), tmp_path)
     (problem,) = records.read(tmp_path / "problems.jsonl")
     assert problem["sparse"]["unknowns"] == 216
     assert (problem["cond_K"] is not None) == ("dual" in order)
@@ -105,7 +105,7 @@ def test_both_roads_are_recorded_in_either_order(order: tuple[Form, ...], tmp_pa
 def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, shift: float, code: int) -> None:
     """At the last displacement of the junction; an inner unknown is not judged."""
     row = by_form(copy)[form]
-    problem = reference_problem(row["source"], form=row["form"])
+    problem = measurable(row["source"], form=row["form"])
     junction = problem.prepared.assembly.junction
     moved(copy / row["answer"], shift, -1 if junction is None else junction[-1])
     if junction is not None:

@@ -16,7 +16,7 @@ from harness.planning.suite import read_suite
 from harness.solving.session import SolverSession
 from harness.verification.judge import judge
 from harness.verification.reference import best_of_candidates
-from harness.verification.reference_problem import ReferenceProblem, reference_problem
+from harness.verification.reference_problem import ReferenceProblem, measurable
 from problems.build import prepared
 from problems.errors import InputError
 from problems.ladders import make_rung, rung_names
@@ -49,7 +49,7 @@ MAY_GIVE_UP = [("ipm", name) for name in TAKEN if name.endswith("/chain-32")]
 
 @cache
 def opened(name: str) -> ReferenceProblem:
-    return reference_problem(name)
+    return measurable(name)
 
 
 def made_of(name: str) -> ManufacturedProblem:

@@ -19,7 +19,7 @@ from harness.verification import reference as module
 from harness.verification.judge import Judgement
 from harness.verification.proof import Proof
 from harness.verification.reference import STOPPED, best_of_candidates, reference
-from harness.verification.reference_problem import reference_problem
+from harness.verification.reference_problem import measurable
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase, Vector
@@ -149,7 +149,7 @@ def test_a_row_says_why_it_cannot_be_judged(tmp_path: Path) -> None:
     assert read_suite(str(suite)).reference_limit_s == 0.001
     assert {m.suite.reference_limit_s for m in expand(read_suite(str(suite)))} == {0.001}
     judgement = Judgement("cannot_be_judged", 1e-3)
-    problem = reference_problem("hard/pivoting/fathi-008")
+    problem = measurable("hard/pivoting/fathi-008")
     wide = replace(problem)
     vars(wide)["reference"] = replace(problem.reference, bound_mm=1e-3, route=f"proven, {STOPPED}")
     assert why_not_judged(judgement, wide) == f"reference error bound 1e-03 mm: proven, {STOPPED}"
