@@ -141,19 +141,17 @@ def _read(path: Path, m: int, options: TableOptions) -> Matrix:
             case ".csv":
                 return read_gaps(path, m, TABLE_MIB, options)
             case ".npy":
-                return _real(np.load(path, mmap_mode="r"))
+                gaps: Matrix = np.load(path, mmap_mode="r")
             case ".npz":
                 with np.load(path) as archive:
                     (name,) = ["gaps"] if "gaps" in archive.files else archive.files
-                    return _real(archive[name])
+                    gaps = archive[name]
+            case _:
+                raise InputError.one(path, "file", suffix, "a .csv, .npz or .npy")
+        if gaps.dtype.kind not in "fiu":
+            raise ValueError(f"an array of {gaps.dtype}")
+        return gaps
     except InputError:
         raise
     except Exception as error:  # and zipfile raise their own kinds
         raise InputError.one(path, "file", damage(error), "a readable table of numbers") from error
-    raise InputError.one(path, "file", suffix, "a .csv, .npz or .npy")
-
-
-def _real(array: Matrix) -> Matrix:
-    if array.dtype.kind not in "fiu":
-        raise ValueError(f"an array of {array.dtype}")
-    return array

@@ -117,21 +117,16 @@ def condensed_stiffness(key: str, part: PartModel, reporter: Reporter, name: str
     """
 
     def made() -> storage.Entry:
-        start = time.perf_counter()
-        return {"K": _condensed(part, reporter, name)}, {"seconds": time.perf_counter() - start}
+        start, keep, lines = time.perf_counter(), np.zeros(part.plate.size, dtype=bool), lines_across(part)
+        keep[part.deflections] = True
+        S = condense(part.stiffness(), lines, keep, reporter, name)
+        kept = np.concatenate(lines)
+        order = np.argsort(kept[keep[kept]])
+        K = S.T.take(order, axis=0).take(order, axis=1).T  # by columns, and symmetric to the last bit
+        return {"K": K}, {"seconds": time.perf_counter() - start}
 
     arrays, facts = storage.load_or_make(key, made)
     return arrays["K"], facts["seconds"]
-
-
-def _condensed(part: PartModel, reporter: Reporter, name: str) -> Matrix:
-    keep = np.zeros(part.plate.size, dtype=bool)
-    keep[part.deflections] = True
-    lines = lines_across(part)
-    S = condense(part.stiffness(), lines, keep, reporter, name)
-    kept = np.concatenate(lines)
-    order = np.argsort(kept[keep[kept]])
-    return S.T.take(order, axis=0).take(order, axis=1).T  # by columns, and symmetric to the last bit
 
 
 def condensed_load(
