@@ -8,7 +8,7 @@ from harness.results.comparison import Incomparable, Side, measurement, read_sid
 from harness.results.records import MEASUREMENTS
 from report.analysis.comparison import compared
 from report.document.escape import quoted
-from report.results.rows import of_records
+from report.results.rows import frame
 from report.writers.comparison_report import Comparison, write
 
 MAX_SLOWDOWN = 1.3
@@ -83,7 +83,7 @@ def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float 
         allowed = f"times of one machine: {'; '.join(sorted(old.machines | new.machines))}"
         raise Incomparable.one(new.name, "--max-slowdown", max_slowdown, allowed)
     old_rows, new_rows = (
-        of_records([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)
+        frame(quoted([row | {"measurement": measurement(row)} for row in side.rows])) for side in (old, new)
     )
     table = compared(old_rows, new_rows, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
     return Comparison(quoted(old.name), quoted(new.name), table, untimed)

@@ -53,7 +53,7 @@ def curves(cells: pd.DataFrame) -> set[str]:
 
 def swept(results: Results) -> pd.DataFrame:
     """The cells that were run, with errors; none if no method has a curve."""
-    cells = results.cells[~results.cells["status"].isin(["unsupported", "not_run"])]
+    cells = results.cells[~results.cells["status"].isin(NOT_RUN)]
     return with_errors(cells) if curves(cells) else with_errors(cells.iloc[:0])
 
 

@@ -87,7 +87,7 @@ def exceedance_figure(curves: dict[str, tuple[Array, Array]]) -> figure:
 
     curves : by name t, mm, and the share in %.
     """
-    from bokeh.models import HoverTool
+    from bokeh.models import HoverTool, PrintfTickFormatter
 
     plot = _figure("gap t, mm", "share with more than t, %", width=760, height=320, y_axis_type="log")
     for (name, (gap, share)), (colour, dash) in zip(curves.items(), CURVE_LOOKS, strict=True):
@@ -98,6 +98,7 @@ def exceedance_figure(curves: dict[str, tuple[Array, Array]]) -> figure:
     empty: dict[str, list[float]] = {"x": [], "y": []}
     plot.line("x", "y", source=empty, name="contact", legend_label="the contact chosen", **dotted)
     plot.legend.location = "bottom_left"
+    plot.yaxis.formatter = PrintfTickFormatter(format="%g")
     lines = [("gap, mm", "@x{0.0000}"), ("share with more, %", "@y{0.000}")]
     plot.add_tools(HoverTool(tooltips=lines, mode="vline"))
     return plot
@@ -110,13 +111,9 @@ def precision_figure(errors: tuple[float, float], seconds: tuple[float, float]) 
     """
     from bokeh.models import BoxAnnotation, HoverTool, Span, TapTool
 
-    scales: dict[str, Any] = {
-        "x_axis_type": "log",
-        "y_axis_type": "log",
-        "x_range": errors,
-        "y_range": seconds,
-    }
-    plot = _figure("error, mm", "seconds", width=440, height=270, **scales)
+    scales: dict[str, Any] = {"x_axis_type": "log", "y_axis_type": "log"}
+    ranges: dict[str, Any] = {"x_range": errors, "y_range": seconds}
+    plot = _figure("error, mm", "seconds", width=440, height=270, **scales, **ranges)
     plot.add_layout(BoxAnnotation(name="bound", fill_color="#000000", fill_alpha=0.07, line_color=None))
     plot.add_layout(Span(name="limit", dimension="height", line_dash="dashed"))
     columns = ("reached_mm", "seconds", "color", "face", "marker", "angle", "dash", "alpha", "about", "key")

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, of_kind
-from report.document.escape import quoted
 from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
@@ -49,11 +48,6 @@ def _chosen(rows: pd.DataFrame) -> pd.Series[bool]:
     best = rows.assign(tolerance=within).groupby(line, dropna=False)["tolerance"].transform("max")
     last = rows.groupby(line, dropna=False)["tolerance"].transform("min")
     return ~searched | (rows["tolerance"] == best.fillna(last))
-
-
-def of_records(records: list[dict[str, Any]]) -> pd.DataFrame:
-    """Rows as `frame` makes them, with every text quoted."""
-    return frame(quoted(records))
 
 
 def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:

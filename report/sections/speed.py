@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure as Drawing
 
 from report.analysis.standings import best_tolerances, seconds_text, shown, spreads
 from report.analysis.time_to_solution import exponent
@@ -87,12 +86,7 @@ def scaling(results: Results) -> Section | None:
         "*Exponents in n*: slopes in log–log with their standard errors, within the limit, without times "
         "below 10 ms and memory below 8 MiB."
     )
-    figure = Figure(
-        "scaling", "*Time and working memory against the size*, within the limit.", _growth(within)
-    )
-    return Section(
-        "Scaling with the problem size", [figure, Table("scaling-exponents", caption, table, columns)]
-    )
+    return Section("Scaling with the problem size", [Table("scaling-exponents", caption, table, columns)])
 
 
 def _exponents(method: object, cells: pd.DataFrame) -> dict[str, Any]:
@@ -102,28 +96,6 @@ def _exponents(method: object, cells: pd.DataFrame) -> dict[str, Any]:
         fit = exponent(cells["n"].tolist(), cells[name].where(cells[name] >= least).tolist())
         line |= {name: fit and fit.slope, f"{name} shown": str(fit or "")}
     return line
-
-
-def _growth(within: pd.DataFrame) -> Drawing:
-    styles = styles_of(within)
-    drawing, panels = style.panels(2, 3.3, style.legend_entries(styles), sharex=True)
-    sizes = within.groupby("n")[["cholesky_s", "m"]].median().dropna()
-    limits = {
-        "load_case_s": (sizes["cholesky_s"], "one Cholesky of Q"),
-        "working_mib": (8 * sizes["m"] ** 2 / 2**20, "Q itself"),
-    }
-    for axes, (name, limit) in zip(panels, limits.items(), strict=True):
-        for method, look in styles.items():
-            line = within[within["method"] == method]
-            axes.plot(line["n"], line[name].where(line[name] >= GROWING[name][1]), **look)
-        yardstick(axes, *limit)
-        axes.set(xscale="log", yscale="log", ylabel=GROWING[name][0])
-        style.plain_log(axes.yaxis)
-    ticks = sorted(within["n"].unique())
-    axes.set_xticks(ticks, [f"{n:.0f}" for n in ticks])
-    axes.minorticks_off()
-    axes.set_xlabel("n")
-    return drawing
 
 
 #: The methods whose rows before version 0.4.0 give the products with Q as their iterations alone.
