@@ -47,8 +47,8 @@ def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 class Table:
     """A table: its `columns` in the report, all of `data` with all digits in NAME.csv beside it.
 
-    More than WIDEST columns continue in further tables; each begins with the first `keys` columns. Names are
-    unique in a report. A table without one has no CSV file.
+    More than WIDEST columns continue in further tables; each begins with the first `keys` columns. Tables and
+    figures of a report have different names. A table without a name has no CSV file.
     """
 
     kind: ClassVar[str] = "table"
@@ -80,8 +80,8 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, saved as NAME.png; `caption` explains it. data : the values drawn, for NAME.csv; None if a
-    table of the report has them.
+    """A picture, saved as NAME.png; `caption` explains it. data : the values drawn, saved as NAME.csv; None
+    if a table of the report shows them.
     """
 
     kind: ClassVar[str] = "figure"

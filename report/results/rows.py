@@ -41,7 +41,7 @@ def frame(records: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def _chosen(rows: pd.DataFrame) -> pd.Series[bool]:
-    """Of a search for a tolerance, the loosest whose answer is within the limit, else the last tried."""
+    """The rows to keep: a search keeps its loosest tolerance within the limit, or else the tightest."""
     line = [name for name in CELL if name != "tolerance"]
     searched, first = rows["searched"] == 1.0, rows["repeat"] == 0
     within = rows["tolerance"].where(first & (rows["verdict"] == "within"))

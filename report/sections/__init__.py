@@ -1,8 +1,8 @@
 """The sections of the report in their order.
 
 A section is a function from results to tables and the charts of them, or None if the results have nothing
-for it. To add one, write the function and name it here, after the results that it is given: those on the
-rungs of ladders, on scenes drawn at random, on all other scenes, or all.
+for it. SECTIONS names each function after the rows that it takes: "ladders" are rungs of ladders, "drawn" are
+scenes drawn at random, "scenes" are all but ladders and more than 40 drawn scenes, "all" are all rows.
 """
 
 from collections.abc import Callable
