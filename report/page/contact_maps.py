@@ -151,8 +151,10 @@ def _added(
     place = {side: exact(values) for side, values in _cells(nodes[::step]).items()}
     made = {text: _field(text, values[::step]) for text, values in fields.items()}
     groups = page["groups"]
-    spent = sum(map(_letters, groups)) + sum(_size(other["fields"]) for other in page["maps"])
-    if spent + _size(made) + (0 if place in groups else _letters(place)) > budget:
+    spent = sum(len(text) for group in groups for text in group.values()) + sum(
+        _size(other["fields"]) for other in page["maps"]
+    )
+    if spent + _size(made) + (0 if place in groups else sum(map(len, place.values()))) > budget:
         return False
     if place not in groups:
         groups.append(place)
@@ -214,10 +216,6 @@ def _cells(nodes: Array) -> dict[str, Array]:
         **{"x": x, "left": across[column], "right": across[column + 1]},
         **{"y": y, "bottom": up[row], "top": up[row + 1]},
     }
-
-
-def _letters(group: dict[str, str]) -> int:
-    return sum(map(len, group.values()))
 
 
 def _size(fields: dict[str, Data]) -> int:

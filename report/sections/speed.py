@@ -10,7 +10,7 @@ from report.analysis.time_to_solution import exponent
 from report.document.blocks import Column, Figure, Section, Table, number, records, word
 from report.document.numbers import spread, whole
 from report.figures import style
-from report.figures.line_charts import MARKS, against_contacts, entries, styles_of, yardstick
+from report.figures.line_charts import BESIDE, MARKS, YARDSTICK, against_contacts, entries, styles_of
 from report.results.reader import Results
 from report.results.rows import in_order
 
@@ -58,7 +58,9 @@ def contacts(results: Results) -> Section | None:
         against_contacts(axes, of_size, styles)
         axes.set_title(f"n = {n:.0f}" + (f", m = {m:.0f}" if m > 0 else ""), pad=5)
         if of_size["cholesky_s"].notna().any():
-            yardstick(axes, of_size.groupby("active")["cholesky_s"].median().dropna(), "one Cholesky of Q")
+            heights = of_size.groupby("active")["cholesky_s"].median().dropna()
+            axes.plot(heights.index, heights, **YARDSTICK)
+            axes.annotate("one Cholesky of Q", (heights.index[-1], heights.iloc[-1]), (8, 0), **BESIDE)
     axes.set_xlabel("active contacts")
     caption = (
         "*Seconds per load case against the active contacts*, with the best tolerance on each scene; "
