@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import pandas as pd
+
 from harness.results.atomic_output import refuse_unwritable
 from harness.results.comparison import Incomparable, Side, measurement, read_side, refuse_incomparable
 from harness.results.records import MEASUREMENTS
@@ -38,7 +40,7 @@ def compare(
     key : str, optional
         Only the row with this key.
     out : str or Path, optional
-        Directory for comparison.md and comparison.csv.
+        Directory for comparison.md, comparison.csv and index.html.
 
     Returns
     -------
@@ -86,4 +88,6 @@ def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float 
         frame(quoted([row | {"measurement": measurement(row)} for row in side.rows])) for side in (old, new)
     )
     table = compared(old_rows, new_rows, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
-    return Comparison(quoted(old.name), quoted(new.name), table, untimed)
+    names = quoted(old.name), quoted(new.name)
+    both = pd.concat([rows.assign(side=side) for rows, side in zip((old_rows, new_rows), names, strict=True)])
+    return Comparison(*names, table, untimed, both)

@@ -57,6 +57,12 @@ def swept(results: Results) -> pd.DataFrame:
     return with_errors(cells) if curves(cells) else with_errors(cells.iloc[:0])
 
 
+def pareto(points: pd.DataFrame) -> pd.DataFrame:
+    """The points that no other beats in both `error` and `load_case_s`, by increasing error."""
+    ordered = points.sort_values(["error", "load_case_s"])
+    return ordered[ordered["load_case_s"] < ordered["load_case_s"].cummin().shift(fill_value=math.inf)]
+
+
 def accurate(cells: pd.DataFrame, accuracy_mm: float) -> pd.Series[bool]:
     """Where the error is at most accuracy_mm, and the reference accurate enough to say so."""
     cells = with_errors(cells)

@@ -1,14 +1,22 @@
 """Accuracy: what it costs, and whose tolerance can be trusted."""
 
+from operator import itemgetter
 from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from report.analysis.standings import curves, swept
-from report.document.blocks import Figure, Section, Table, number, word
-from report.document.numbers import whole
+from report.analysis.standings import (
+    ACCURACIES,
+    curves,
+    fastest_first,
+    judged,
+    pareto,
+    swept,
+)
+from report.document.blocks import Column, Figure, Section, Table, number, word
+from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.figures import style
 from report.figures.line_charts import styles_of
 from report.results.reader import Results
@@ -16,15 +24,55 @@ from report.results.rows import in_order, named
 
 LARGEST_ERROR_MM = 1.0  # larger errors are drawn there
 DOTTED: dict[str, Any] = {"color": "black", "linewidth": 1.1, "linestyle": (0, (1, 1.5))}
+STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, "drawstyle": "steps-post"}
 
 
 def costs(results: Results) -> Section | None:
-    """Time against error by size."""
+    """Time against error by size, and the time to reach each of ACCURACIES."""
     cells = swept(results)
     if cells["error"].isna().all():
         return None
-    figures = [_diagram(of_size, results.limit) for _, of_size in cells.groupby("n") if curves(of_size)]
-    return Section("The cost of accuracy", figures) if figures else None
+    sizes = [of_size for _, of_size in cells.groupby("n")]
+    columns = [number("n", "n", whole), word("solver (form)", "method")]
+    for accuracy in map(tidy_power, ACCURACIES):
+        columns.append(Column(f"≤ {accuracy} mm", itemgetter(f"price_{accuracy}")))
+    caption = (
+        "*Price list*: seconds per load case of the fastest run on each scene with an error of at most that "
+        "of the heading, the geometric mean over the scenes; >: stopped at the time limit; not reached: "
+        "with the smallest error on the worst scene."
+    )
+    table = Table("price-list", caption, pd.concat([_prices(of_size) for of_size in sizes]), columns)
+    figures = [_diagram(of_size, results.limit) for of_size in sizes if curves(of_size)]
+    return Section("The cost of accuracy", [*figures, table])
+
+
+def _prices(cells: pd.DataFrame) -> pd.DataFrame:
+    """One line per method at one size: the seconds and their text for each of ACCURACIES."""
+    lines = pd.DataFrame({"n": cells["n"].iloc[0], "method": in_order(cells, "method")})
+    scenes = cells["scene"].nunique()
+    for accuracy in ACCURACIES:
+        name = tidy_power(accuracy)
+        means = fastest_first(cells, "method", accuracy_mm=accuracy).set_index("method")["seconds"]
+        lines[f"seconds_{name}"] = lines["method"].map(means)
+        lines[f"price_{name}"] = [
+            f"{significant(means[method])} s" if method in means else _missed(runs, accuracy, scenes)
+            for method in lines["method"]
+            for runs in [cells[cells["method"] == method]]
+        ]
+    return lines
+
+
+def _missed(runs: pd.DataFrame, accuracy: float, scenes: int) -> str:
+    """Why a method has no price: the time limit only where no answer missed the accuracy."""
+    if runs["scene"].nunique() < scenes:
+        return MISSING
+    if not judged(runs, accuracy):
+        return "cannot be judged"
+    late = runs["error"].isna() & (runs["status"] == "time_limit")
+    if runs.loc[late | (runs["error"] <= accuracy), "scene"].nunique() == scenes:
+        return f"> {significant(runs.loc[late, 'time_limit_s'].min())} s"
+    best = runs.groupby("scene")["error"].min()
+    return "no answer" if best.isna().any() else f"not reached ({power(best.max(), 2)})"
 
 
 def _diagram(cells: pd.DataFrame, limit: str) -> Figure:
@@ -51,10 +99,16 @@ def _diagram(cells: pd.DataFrame, limit: str) -> Figure:
         active = here["active"].iloc[0]
         axes.set_title(f"n = {n}" + (f", {active:.0f} active" if active == active else ""))
         axes.set_xlabel("displacement error, mm (max norm)")
+    (_, right), (_, top) = panels[0].get_xlim(), panels[0].get_ylim()
+    for axes, scene in zip(panels, ends, strict=True):
+        front = pareto(points[points["scene"] == scene])
+        errors, seconds = front["error"].tolist(), front["load_case_s"].tolist()
+        across, up = [errors[0], *errors, right], [top, *seconds, seconds[-1]]
+        axes.plot(across, up, scalex=False, scaley=False, **STAIRCASE)
     style.plain_log(panels[0].yaxis)
     caption = (
-        f"*Time against achieved accuracy, n = {n}*: lower left is better; dotted: {limit}. The "
-        "tolerances of a solver are joined."
+        f"*Time against achieved accuracy, n = {n}*: lower left is better; dotted: {limit}; grey: the Pareto "
+        "front. The tolerances of a solver are joined."
     )
     return Figure(f"time-accuracy-{n}", caption, drawing)
 

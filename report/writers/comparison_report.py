@@ -1,4 +1,4 @@
-"""Writes what changed between runs: comparison.md, comparison.csv with every measurement."""
+"""Writes what changed between runs: comparison.md, comparison.csv with every measurement, and index.html."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,10 +8,13 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.checks import commits_text
 from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
-from report.document.blocks import Block, Column, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import file_name
-from report.document.numbers import MISSING, as_number, counted, power, significant, whole
+from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
+from report.page.page_file import Data, banner
+from report.page.page_file import write as write_page
 from report.writers.sections_writer import written
 
 NOTE = (
@@ -24,12 +27,15 @@ SIDES = ("old", "new")
 
 @dataclass(frozen=True)
 class Comparison:
-    """One run against an older one. untimed : why times are not compared, a sentence, or ""."""
+    """One run against an older one. untimed : why times are not compared, a sentence, or ""; rows : of both,
+    with their `side`.
+    """
 
     old: str
     new: str
     table: pd.DataFrame
     untimed: str
+    rows: pd.DataFrame
 
     @property
     def worse(self) -> bool:
@@ -91,6 +97,7 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
         sections.append(Section(f"{pair.old} → {pair.new}", blocks))
     lines = pd.concat([pair.table.assign(old=pair.old, new=pair.new) for pair in comparisons])
     title = f"Compared with {comparisons[0].old}"
+    write_page(out / "index.html", title, comparison_data(comparisons))
     return written(out / "comparison.md", title, sections, files={"comparison": lines})
 
 
@@ -102,3 +109,29 @@ def _blocks(pair: Comparison, prefix: str) -> list[Block]:
     if len(solvers := by_solver(pair.table)):
         blocks.append(Table(f"{prefix}solvers", "*Solver by solver.*", solvers, SOLVERS))
     return blocks
+
+
+def comparison_data(comparisons: list[Comparison]) -> Data:
+    """The data of the page."""
+    return {
+        "banner": _banner(pd.concat([pair.rows for pair in comparisons])),
+        "tables": [
+            {
+                "title": f"{pair.old} → {pair.new}",
+                "summary": pair.summary,
+                "heads": [column.heading for column in COLUMNS],
+                "lines": [[str(column.show(line)) for column in COLUMNS] for line in records(pair.table)],
+            }
+            for pair in comparisons
+        ],
+    }
+
+
+def _banner(rows: pd.DataFrame) -> Data:
+    sides = [(str(side), of_side) for side, of_side in rows.groupby("side", sort=False)]
+    changed = [side for side, of_side in sides if (of_side["clean"] == 0).any()]
+    warned = [f"Rows of {listed(changed)} were measured with uncommitted changes."] if changed else []
+    if rows["machine"].nunique() > 1:
+        warned.append("The rows come from several machines; times are compared within one machine only.")
+    code = "; ".join(f"{side}: {commits_text(of_side)}" for side, of_side in sides)
+    return banner(rows, counted(len(rows), "row"), warned) | {"commits": code}

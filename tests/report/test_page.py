@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hostile_texts import HOSTILE, MADE
 from published_runs import DIRECTORIES
@@ -15,12 +16,13 @@ from synthetic_results import SIZES, everything, no_answer, results, row, write_
 from synthetic_series import made as made_series
 
 from report.figures import style
-from report.page import contact_maps, run_page_data
+from report.page import answer_page_data, contact_maps, run_page_data
 from report.page.page_file import packed, write
 from report.page.run_page_data import run_data
 from report.results.reader import read
 from report.results.series_results import QUANTILES, quantile_maps
 from report.results.series_results import read as read_series
+from report.writers import comparison_report
 from report.writers.series_report import write as write_series
 
 #: `HOSTILE` in Markdown.
@@ -213,3 +215,19 @@ def test_a_directory_without_an_answer_has_a_page(tmp_path: Path) -> None:
     assert column(data, "load_case_s") == [None]
     empty = page_of(write_rows(tmp_path / "empty", []), tmp_path / "index.html").data
     assert column(empty, "key") == []
+
+
+def test_the_banners_name_the_code(tmp_path: Path) -> None:
+    mixed = results(tmp_path, [row(commit="a" * 40), row(solver="gi", commit="b" * 40)])
+    assert "mix rows" in run_data(mixed)["banner"]["warnings"][0]
+    record = {"method": "newton", "machine": "CPU", "commit": "a" * 40, "recorded_at": "2026-01-02T03:04:05"}
+    clean = answer_page_data._banner([record | {"clean": True}])
+    assert (clean["machines"], clean["measured"]) == (["CPU"], "2026-01-02 03:04 UTC")
+    assert clean["commits"] == "a" * 40 + " (clean)"
+    assert not clean["warnings"]
+    assert "uncommitted" in answer_page_data._banner([record | {"clean": False}])["warnings"][0]
+    assert answer_page_data._banner([{"method": "newton"}])["commits"] == "not recorded"
+    rows = pd.DataFrame([record | {"clean": True, "side": "old"}, record | {"clean": False, "side": "new"}])
+    both = comparison_report._banner(rows.assign(machine=["CPU", "other"]))
+    assert "old: " + "a" * 40 in both["commits"]
+    assert [warning.split()[-2] for warning in both["warnings"]] == ["uncommitted", "machine"], both

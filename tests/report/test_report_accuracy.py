@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from matplotlib.image import imread
-from synthetic_results import HIGH, LOW, answer, results, sweep, table, write_rows
+from synthetic_results import HIGH, LOW, answer, no_answer, results, row, shown, sweep, table, write_rows
 
 from report.analysis.standings import best_tolerances, fastest_first, swept, with_errors
 from report.document.blocks import Figure
@@ -16,6 +16,10 @@ from report.writers.suite_report import write
 
 def changed(rows: list[dict[str, Any]], solver: str, **figures: Any) -> list[dict[str, Any]]:
     return [r | figures if r["solver"] == solver else r for r in rows]
+
+
+def prices(found: Results) -> Any:
+    return table(accuracy.costs(found), "price-list").data.set_index("method")
 
 
 def advised(found: Results) -> Any:
@@ -62,11 +66,51 @@ def test_the_diagram_shows_the_fewest_and_the_most_contacts(tmp_path: Path) -> N
     assert titles == ["n = 4386, 100 active", "n = 4386, 900 active"]
 
 
+def test_the_front_is_drawn_through_what_nothing_beats(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", 3, 1.0, 1e-3), answer(LOW, "b", 5, 2.0, 1e-5), answer(LOW, "c", 4, 3.0, 1e-4)]
+    rows += [answer(LOW, "d", k, 4.0, 1e-4) for k in (5, 6, 7)]
+    (axes,) = panels(results(tmp_path, rows))
+    (front,) = (line for line in axes.lines if line.get_drawstyle() == "steps-post")
+    assert front.get_xdata()[:3].tolist() == [1e-5, 1e-5, 1e-3]
+    assert front.get_ydata()[1:].tolist() == [2.0, 1.0, 1.0]
+
+
 def test_an_error_counts_at_least_as_the_bound_on_the_references(tmp_path: Path) -> None:
     rows = [answer(LOW, "a", 9, 1.0, e, reference_bound_mm=1e-11, repeat=k) for k, e in enumerate((0, 1e-12))]
     rows += [answer(LOW, "b", 9, 1.0, 3e-11, reference_bound_mm=1e-11)]
     cells = with_errors(results(tmp_path, rows).cells).set_index("solver")
     assert cells["error"].to_dict() == {"a": 1e-11, "b": 3e-11}
+
+
+def test_prices_are_the_fastest_measured_run_that_is_accurate_enough(tmp_path: Path) -> None:
+    line = prices(results(tmp_path, sweep())).loc["honest (dual)"]
+    # errors are half the tolerance: 10^-k is first met at k digits, which take 0.01 · 2^k s
+    assert [line[f"seconds_1e-{k}"] for k in (3, 5, 7, 9)] == pytest.approx([0.08, 0.32, 1.28, 5.12])
+
+
+def test_a_price_is_the_geometric_mean_over_the_scenes(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", k, 1.0, 10.0**-k / 2) for k in (3, 5, 7)]
+    rows += [answer(HIGH, "a", k, 4.0, 10.0**-k / 2) for k in (3, 5, 7)]
+    assert prices(results(tmp_path, rows)).loc["a (dual)", "seconds_1e-7"] == pytest.approx(2.0)
+
+
+def test_what_was_not_reached_is_shown_as_such(tmp_path: Path) -> None:
+    rows = [*sweep(), answer(LOW, "once", 9, 1.0, 1e-9)]
+    rows += [row(s, "lost", tolerance=1e-6, **no_answer("crashed")) for s in (LOW, HIGH)]
+    lines = shown(table(accuracy.costs(results(tmp_path, rows)), "price-list"))
+    words = {line[1]: line[2:6] for line in lines}
+    assert words["late (dual)"] == ["1.00 s", "> 68.0 s", "> 68.0 s", "> 68.0 s"]
+    assert words["coarse (dual)"] == ["2.00 s", "2.00 s", "not reached (3.0e-6)", "not reached (3.0e-6)"]
+    assert words["once (dual)"] == ["–"] * 4
+    assert words["lost (dual)"] == ["no answer"] * 4
+
+
+def test_a_reference_too_coarse_for_an_accuracy_does_not_judge_it(tmp_path: Path) -> None:
+    found = results(tmp_path, [r | {"reference_bound_mm": 1e-9} for r in sweep()])
+    line = prices(found).loc["honest (dual)"]
+    assert line["price_1e-7"] == "1.28 s"
+    assert line["price_1e-9"] == "cannot be judged"
+    assert advised(found).loc[1e-9, "use"] == "cannot be judged: the reference is not accurate enough"
 
 
 def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:

@@ -8,9 +8,10 @@ from urllib.parse import parse_qs, urlencode
 import numpy as np
 import pandas as pd
 import pytest
+from commands import harness
 from hostile_texts import HOSTILE, results, solution
 from published_runs import DIRECTORIES
-from synthetic_results import SIZES, everything, row
+from synthetic_results import SIZES, everything, row, write_rows
 from synthetic_results import results as results_of
 from synthetic_series import made as made_series
 
@@ -98,17 +99,20 @@ def judged(cells: pd.DataFrame, limit: float) -> pd.Series:
 
 
 def test_no_view_has_an_error(chromium: Any, made: tuple[pd.DataFrame, Path], tmp_path: Path) -> None:
-    folders = [tmp_path / name for name in ("hostile", "solution", "series", "empty")]
+    folders = [tmp_path / name for name in ("hostile", "solution", "series", "old", "new", "empty")]
     for folder in folders:
         folder.mkdir()
-    hostile, answer, series, empty = folders
+    hostile, answer, series, old, new, empty = folders
     found = read(results(hostile, HOSTILE))
     pages = [made[1], write(hostile / "index.html", str(found.suite["title"]), run_data(found), hostile)]
     pages.append(write(empty / "index.html", "", run_data(results_of(empty, [])), empty))
     write_solution(solution(answer, HOSTILE))
     made_series(series)
     write_series(series)
-    pages += [answer / "index.html", series / "report" / "index.html"]
+    for side, seconds in ((old, 1.0), (new, 9.0)):
+        write_rows(side, [row(solve_s=seconds), row(solver="gi")])
+    harness("compare", old, new, "--out", tmp_path / "compared")
+    pages += [answer / "index.html", series / "report" / "index.html", tmp_path / "compared" / "index.html"]
     for page in pages:
         opened(chromium, page)
         views = chromium.execute_script(
