@@ -7,7 +7,7 @@ for (const [name, value] of new URLSearchParams(location.hash.slice(1)))
 
 function update(changes) {
   for (const [name, value] of Object.entries(changes)) form.elements[name].value = value;
-  show();
+  changed();
 }
 
 // An element; its children are texts or elements, never markup.

@@ -1,5 +1,6 @@
 """The page in a browser: its verdicts against the judge's, sorting, filters, the address, the keyboard."""
 
+import itertools
 import time
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from report.writers.answer_report import write as write_solution
 from report.writers.series_report import write as write_series
 
 pytestmark = pytest.mark.slow
+LOADS = itertools.count()
 SEEN = "[...document.querySelectorAll('#tables td[data-key]')]"
 NAMED = r"td.title.split('\n')[0].split(' on ')"  # label and scene
 #: The figure that has a renderer of a name.
@@ -46,8 +48,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, Path]:
 
 
 def opened(driver: Any, page: Path, address: str = "") -> None:
-    driver.get("about:blank")
-    driver.get(f"{page.as_uri()}#{address}")
+    """Load a page anew; through about:blank instead Chromium's driver hangs once in a hundred times."""
+    driver.get(f"{page.as_uri()}?{next(LOADS)}#{address}")
 
 
 def errors(driver: Any) -> list[str]:
