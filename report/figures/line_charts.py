@@ -96,6 +96,12 @@ def entries(cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> list[Line
     return style.legend_entries(styles | looks)
 
 
+def yardstick(axes: Axes, heights: pd.Series[float], what: str) -> None:
+    """Draw a grey line of heights by their place along the axis, with its name at its end."""
+    axes.plot(heights.index, heights, **YARDSTICK)
+    axes.annotate(what, (heights.index[-1], heights.iloc[-1]), (8, 0), **BESIDE)
+
+
 @dataclass(frozen=True)
 class Cell:
     text: str

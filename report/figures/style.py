@@ -127,11 +127,13 @@ def figure_above(height: float, handles: list[Line2D]) -> Figure:
     return drawing
 
 
-def panels(count: int, height: float, handles: list[Line2D]) -> tuple[Figure, list[Axes]]:
+def panels(
+    count: int, height: float, handles: list[Line2D], sharex: bool = False
+) -> tuple[Figure, list[Axes]]:
     """Panels of that height, one below the other, with a legend beside them."""
     drawing = figure(height * count + 0.4)
     drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
-    return drawing, list(drawing.subplots(count, 1, squeeze=False)[:, 0])
+    return drawing, list(drawing.subplots(count, 1, squeeze=False, sharex=sharex)[:, 0])
 
 
 def looks(solvers: Iterable[str]) -> dict[str, tuple[str, str]]:

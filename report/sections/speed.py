@@ -4,13 +4,14 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pandas as pd
+from matplotlib.figure import Figure as Drawing
 
 from report.analysis.standings import best_tolerances, seconds_text, shown, spreads
 from report.analysis.time_to_solution import exponent
 from report.document.blocks import Column, Figure, Section, Table, number, records, word
 from report.document.numbers import spread, whole
 from report.figures import style
-from report.figures.line_charts import BESIDE, MARKS, YARDSTICK, against_contacts, entries, styles_of
+from report.figures.line_charts import MARKS, against_contacts, entries, styles_of, yardstick
 from report.results.reader import Results
 from report.results.rows import in_order
 
@@ -58,9 +59,7 @@ def contacts(results: Results) -> Section | None:
         against_contacts(axes, of_size, styles)
         axes.set_title(f"n = {n:.0f}" + (f", m = {m:.0f}" if m > 0 else ""), pad=5)
         if of_size["cholesky_s"].notna().any():
-            heights = of_size.groupby("active")["cholesky_s"].median().dropna()
-            axes.plot(heights.index, heights, **YARDSTICK)
-            axes.annotate("one Cholesky of Q", (heights.index[-1], heights.iloc[-1]), (8, 0), **BESIDE)
+            yardstick(axes, of_size.groupby("active")["cholesky_s"].median().dropna(), "one Cholesky of Q")
     axes.set_xlabel("active contacts")
     caption = (
         "*Seconds per load case against the active contacts*, with the best tolerance on each scene; "
@@ -88,7 +87,12 @@ def scaling(results: Results) -> Section | None:
         "*Exponents in n*: slopes in log–log with their standard errors, within the limit, without times "
         "below 10 ms and memory below 8 MiB."
     )
-    return Section("Scaling with the problem size", [Table("scaling-exponents", caption, table, columns)])
+    figure = Figure(
+        "scaling", "*Time and working memory against the size*, within the limit.", _growth(within)
+    )
+    return Section(
+        "Scaling with the problem size", [figure, Table("scaling-exponents", caption, table, columns)]
+    )
 
 
 def _exponents(method: object, cells: pd.DataFrame) -> dict[str, Any]:
@@ -98,6 +102,28 @@ def _exponents(method: object, cells: pd.DataFrame) -> dict[str, Any]:
         fit = exponent(cells["n"].tolist(), cells[name].where(cells[name] >= least).tolist())
         line |= {name: fit and fit.slope, f"{name} shown": str(fit or "")}
     return line
+
+
+def _growth(within: pd.DataFrame) -> Drawing:
+    styles = styles_of(within)
+    drawing, panels = style.panels(2, 3.3, style.legend_entries(styles), sharex=True)
+    sizes = within.groupby("n")[["cholesky_s", "m"]].median().dropna()
+    limits = {
+        "load_case_s": (sizes["cholesky_s"], "one Cholesky of Q"),
+        "working_mib": (8 * sizes["m"] ** 2 / 2**20, "Q itself"),
+    }
+    for axes, (name, limit) in zip(panels, limits.items(), strict=True):
+        for method, look in styles.items():
+            line = within[within["method"] == method]
+            axes.plot(line["n"], line[name].where(line[name] >= GROWING[name][1]), **look)
+        yardstick(axes, *limit)
+        axes.set(xscale="log", yscale="log", ylabel=GROWING[name][0])
+        style.plain_log(axes.yaxis)
+    ticks = sorted(within["n"].unique())
+    axes.set_xticks(ticks, [f"{n:.0f}" for n in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("n")
+    return drawing
 
 
 #: The methods whose rows before version 0.4.0 give the products with Q as their iterations alone.

@@ -10,6 +10,7 @@ from scipy.stats import linregress
 from synthetic_results import no_answer, results, row, shown, table
 
 from report.analysis.time_to_solution import exponent
+from report.figures import style
 from report.sections import speed
 
 LOW, HIGH = "4386/0052", "4386/1074"
@@ -36,6 +37,8 @@ def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: P
     assert data["load_case_s"].to_dict() == pytest.approx({"newton (sparse)": 1.0, "newton (dual)": 1.5})
     assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
     assert data["largest"].tolist() == [100_000, 8000]
+    with style.applied():
+        section.blocks[0].drawing.savefig(tmp_path / "scaling.png")
     assert speed.scaling(results(tmp_path / "few", rows[:4])) is None
 
 
