@@ -5,9 +5,11 @@ const at = name => form.elements[name]?.value ?? "";
 for (const [name, value] of new URLSearchParams(location.hash.slice(1)))
   if (form.elements[name]) form.elements[name].value = value;
 
-function update(changes) {
+function update(changes = {}) {
   for (const [name, value] of Object.entries(changes)) form.elements[name].value = value;
-  changed();
+  const fields = [...new FormData(form)].filter(([name, value]) => value !== START.get(name));
+  history.replaceState(null, "", `#${new URLSearchParams(fields)}`);
+  show();
 }
 
 // An element; its children are texts or elements, never markup.

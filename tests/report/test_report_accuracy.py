@@ -106,11 +106,11 @@ def test_what_was_not_reached_is_shown_as_such(tmp_path: Path) -> None:
 
 
 def test_a_reference_too_coarse_for_an_accuracy_does_not_judge_it(tmp_path: Path) -> None:
-    found = results(tmp_path, [r | {"reference_bound_mm": 1e-9} for r in sweep()])
-    line = prices(found).loc["honest (dual)"]
+    coarse = results(tmp_path, [r | {"reference_bound_mm": 1e-9} for r in sweep()])
+    line = prices(coarse).loc["honest (dual)"]
     assert line["price_1e-7"] == "1.28 s"
     assert line["price_1e-9"] == "cannot be judged"
-    assert advised(found).loc[1e-9, "use"] == "cannot be judged: the reference is not accurate enough"
+    assert advised(coarse).loc[1e-9, "use"] == "cannot be judged: the reference is not accurate enough"
 
 
 def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:
