@@ -17,6 +17,7 @@ from harness.scene.allowed_gap import check_series, refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
 from harness.series.session import Job, SeriesOptions
+from harness.solving.call_lock import keeps_threads
 from harness.terminal import DONE, NOTHING_JUDGED
 from harness.terminal.console import console_of
 from problems.errors import Fault, InputError
@@ -59,6 +60,7 @@ class SeriesOutcome:
         return list(series_file.rows(self.directory))
 
 
+@keeps_threads
 def run_series(
     scene: str | Path,
     out: str | Path,

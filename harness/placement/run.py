@@ -30,6 +30,7 @@ from harness.scene.scene_file import MOVED, edited, with_fasteners, with_gaps
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
+from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
@@ -74,6 +75,7 @@ class Placement:
     report: Path
 
 
+@keeps_threads
 def place(
     scene: str | Path,
     out: str | Path,

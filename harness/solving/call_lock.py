@@ -9,6 +9,8 @@ from collections.abc import Callable
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
+import threadpoolctl
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -23,6 +25,17 @@ def in_turn(function: Callable[P, R]) -> Callable[P, R]:
     @wraps(function)
     def call(*args: P.args, **options: P.kwargs) -> R:
         with TURN:
+            return function(*args, **options)
+
+    return call
+
+
+def keeps_threads(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, after which linear algebra has as many threads as before."""
+
+    @wraps(function)
+    def call(*args: P.args, **options: P.kwargs) -> R:
+        with threadpoolctl.threadpool_limits():
             return function(*args, **options)
 
     return call

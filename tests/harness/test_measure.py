@@ -15,7 +15,7 @@ from harness.measurement.worker import Outcome, measure
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.starts]
 
 MIB = 300
 
@@ -54,7 +54,6 @@ def outcome(
     return row
 
 
-@pytest.mark.starts
 def test_a_worker_that_dies_before_it_has_its_job(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The job cannot be handed over, neither when it is written nor when the pipe is closed."""
     popen = subprocess.Popen

@@ -21,7 +21,7 @@ HERE, OTHER = "0123456789" * 4, "abcdef0123" * 4
 
 @pytest.fixture(autouse=True)
 def _drawn_by_one_commit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(checks, "commit", lambda: (HERE, True))
+    monkeypatch.setattr(checks, "provenance", lambda: {"commit": HERE, "clean": True})
 
 
 def said(directory: Path, *rows: dict[str, Any]) -> list[str]:

@@ -33,7 +33,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An earlier publication of two suites; the code is clean."""
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
     monkeypatch.setattr(published, "STAGED", tmp_path / "publishing")
-    monkeypatch.setattr(published, "commit", lambda: (CODE, True))
+    monkeypatch.setattr(published, "provenance", lambda: {"commit": CODE, "clean": True})
     monkeypatch.chdir(published.ROOT)
     for name in SUITES:
         measured(tmp_path / "published" / name, row("b" * 40))
@@ -115,9 +115,9 @@ def test_scenes_and_large_answers_are_left_out(tmp_path: Path, monkeypatch: pyte
     assert kept == {f"small/{MEASUREMENTS}", f"large/{MEASUREMENTS}", "small/answers.zip"}
 
 
-@pytest.mark.parametrize("known", [(CODE, False), ("0.1.0", None)])
-def test_commit_needed(there: Path, monkeypatch: pytest.MonkeyPatch, known: tuple[str, bool | None]) -> None:
-    monkeypatch.setattr(published, "commit", lambda: known)
+@pytest.mark.parametrize("code", [(CODE, False), ("0.1.0", None)])
+def test_commit_needed(there: Path, monkeypatch: pytest.MonkeyPatch, code: tuple[str, bool | None]) -> None:
+    monkeypatch.setattr(published, "provenance", lambda: dict(zip(("commit", "clean"), code, strict=True)))
     with pytest.raises(SystemExit, match="2"):
         publish(monkeypatch, good)
 

@@ -115,6 +115,7 @@ def test_no_view_has_an_error(chromium: Any, made: tuple[pd.DataFrame, Path], tm
         write_rows(side, [row(solve_s=seconds), row(solver="gi")])
     harness("compare", old, new, "--out", tmp_path / "compared")
     pages += [answer / "index.html", series / "report" / "index.html", tmp_path / "compared" / "index.html"]
+    errors(chromium)  # of other tests
     for page in pages:
         opened(chromium, page)
         views = chromium.execute_script(

@@ -4,11 +4,13 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count, islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+import threadpoolctl
 from sample_size import draws
 from small_problems import make_load, make_prepared
 
@@ -105,3 +107,11 @@ def test_threads_get_the_bits_of_one(name: str) -> None:
 
     with ThreadPoolExecutor(THREADS) as pool:
         assert list(pool.map(hammer, range(THREADS))) == [0] * THREADS
+
+
+def test_a_series_leaves_the_threads_of_linear_algebra(tmp_path: Path) -> None:
+    before = threadpoolctl.threadpool_info()
+    harness.run_series(
+        "examples/small-joint.toml", tmp_path / "out", options=harness.SeriesOptions(threads=3)
+    )
+    assert threadpoolctl.threadpool_info() == before
