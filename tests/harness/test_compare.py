@@ -159,3 +159,22 @@ def test_a_directory_without_rows_is_bad_input(tmp_path: Path) -> None:
     full, empty = write_rows(tmp_path / "full", [row()]), write_rows(tmp_path / "empty", [])
     for words in ((full, empty), (tmp_path / "none", full)):
         assert compare(*words).exit_code == 2
+
+
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
+    name = "4386/[bold]|`\x1b[31m<b>"
+    old = write_rows(tmp_path / "old", [row(solver=name)])
+    new = write_rows(tmp_path / "new", [row(solver=name, displacement_error_mm=9e-8)])
+    done = compare(old, new, "--out", tmp_path / "out")
+    assert done.exit_code == 1
+    page = (tmp_path / "out" / "comparison.md").read_text()
+    assert "<b>" not in page
+    assert "\x1b" not in page + done.stdout
+
+
+def test_the_same_code_measured_twice_is_not_slower() -> None:
+    """Single runs, two hours apart: times are 0.93 to 1.7 times as long, 1.12 in the median."""
+    published = Path(__file__).parents[2] / "results" / "published"
+    said = harness("compare", published / "default", published / "default-again")
+    assert said.exit_code == 0
+    assert "worse" not in said.output

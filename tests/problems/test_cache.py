@@ -128,7 +128,10 @@ OWN = "input.user_matrices"  # makes a user's matrices, no joint's
 
 @pytest.mark.parametrize(
     "module",
-    ["model.condensation", "stiffness.dense_block", "forms.preparation_stages", "effects.supports", OWN],
+    [
+        *("model.plate", "model.condensation", "model.joint", "model.part"),
+        *("stiffness.dense_block", "forms.preparation_stages", "effects.supports", OWN),
+    ],
 )
 def test_a_change_of_the_code_that_builds_changes_the_key(
     module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -151,3 +154,20 @@ def test_a_folder_that_cannot_be_made(root: Path) -> None:
     root.write_text("a file where the folder should be")
     with pytest.raises(InputError, match="RIVETBENCH_CACHE"):
         build.prepared(SCENE)
+
+
+def test_a_writer_that_fails_leaves_nothing(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save = np.save
+
+    def disk_full(path: Path, array: Any) -> None:
+        if path.name == "two.npy":
+            path.write_bytes(b"half")
+            raise OSError("no space left on device")
+        save(path, array)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "save", disk_full)
+        with pytest.raises(OSError, match="no space"):
+            storage.store("key", ARRAYS, {})
+    assert list(root.iterdir()) == []
+    assert storage.load("key") is None

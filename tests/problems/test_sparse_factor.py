@@ -60,7 +60,7 @@ def test_a_band_is_factored_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.usefixtures("library")
-@pytest.mark.parametrize("seed", seeds(1, 12))
+@pytest.mark.parametrize("seed", seeds(3, 12))
 def test_each_factor_solves_as_the_dense_matrix_does(seed: int) -> None:
     random = np.random.default_rng(seed)
     n = int(random.integers(300, 500))
@@ -131,7 +131,7 @@ def grid(*shape: int) -> sp.csc_array:
 
 
 @pytest.mark.usefixtures("library")
-@pytest.mark.parametrize("seed", seeds(1, 12))
+@pytest.mark.parametrize("seed", seeds(3, 12))
 def test_a_mechanism_is_named_by_an_unknown_that_moves(seed: int) -> None:
     """A chain that nothing holds, among unknowns that are held, in each of the three kinds of factor."""
     random = np.random.default_rng(seed)

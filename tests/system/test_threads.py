@@ -97,7 +97,7 @@ def test_what_the_caller_owns_is_the_callers() -> None:
 
 @pytest.mark.parametrize("name", CALLS)
 def test_threads_get_the_bits_of_one(name: str) -> None:
-    call, rounds = CALLS[name], -(-draws(8, 1000) // THREADS)
+    call, rounds = CALLS[name], -(-draws(16, 1000) // THREADS)
     alone = [bits(call(k)) for k in range(THREADS)]
     barrier = threading.Barrier(THREADS)
 
