@@ -48,8 +48,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, Path]:
 
 
 def opened(driver: Any, page: Path, address: str = "") -> None:
-    """Load a page anew; through about:blank instead Chromium's driver hangs once in a hundred times."""
-    driver.get(f"{page.as_uri()}?{next(LOADS)}#{address}")
+    """Load a page anew, and wait for it: Chromium's driver may return before its scripts have run.
+
+    Through about:blank instead the driver hangs once in a hundred times.
+    """
+    load = f"?{next(LOADS)}"
+    driver.get(f"{page.as_uri()}{load}#{address}")
+    eventually(driver, f"location.search === '{load}' && document.readyState === 'complete'")
 
 
 def errors(driver: Any) -> list[str]:
