@@ -7,7 +7,7 @@ the facts, and a hash of it all. So no bound is proven for a file that the disk 
 A fingerprint of code is a hash of what the code does; it is a part of the identity of rows and of cached
 matrices. It ignores comments, layout, docstrings, annotations of functions, the exceptions raised, import
 lines and the locations of files, which cannot change a number. It includes all files that a file imports,
-directly or not, if they lie in the given folders.
+directly or not, if they lie in the given folders. What parsing a file gave is in the cache, too.
 """
 
 import ast
@@ -16,6 +16,7 @@ import hashlib
 import json
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -144,6 +145,7 @@ def _repair(folder: Path) -> str:
 
 #: The folder that holds the project's packages.
 ROOT = Path(__file__).resolve().parents[1]
+OWN_CODE = Path(__file__).read_bytes()
 
 
 def fingerprint(files: Iterable[Path], within: Iterable[str] = (), root: Path = ROOT) -> str:
@@ -166,13 +168,32 @@ def fingerprint(files: Iterable[Path], within: Iterable[str] = (), root: Path = 
 def _read(path: Path, root: Path, changed: int) -> tuple[str, tuple[Path, ...]]:
     """The hash of one file's code and the files below root that it imports; `changed` renews the cache."""
     content = path.read_bytes()
+    key = digest("code", sys.version, OWN_CODE, content)
+    facts = load_or_make(key, lambda: ({}, _parsed(content)))[1]
+    modules = []
+    for level, names in facts["imports"]:
+        folder = path.parents[level - 1] if level else root
+        modules += [folder.joinpath(*name.split(".")) for name in names]
+    files = [file for name in modules for file in (name.with_suffix(".py"), name / "__init__.py")]
+    return facts["hash"], tuple(file for file in files if file.is_file())
+
+
+def _parsed(content: bytes) -> dict[str, Any]:
+    """The hash of a file's code, and the modules that it imports, anywhere in it, by their level."""
     try:
         tree = ast.parse(content)
     except (SyntaxError, ValueError):  # compiled, or no Python
-        return hashlib.sha256(content).hexdigest(), ()
-    imported = tuple(_imported(path, tree, root))
+        return {"hash": hashlib.sha256(content).hexdigest(), "imports": []}
+    imports: list[tuple[int, list[str]]] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            within = [f"{module}.{alias.name}".lstrip(".") for alias in node.names]
+            imports.append((node.level, [module, *within]))
+        elif isinstance(node, ast.Import):
+            imports.append((0, [alias.name for alias in node.names]))
     code = ast.dump(_WithoutText().visit(tree))
-    return hashlib.sha256(code.encode()).hexdigest(), imported
+    return {"hash": hashlib.sha256(code.encode()).hexdigest(), "imports": imports}
 
 
 class _WithoutText(ast.NodeTransformer):
@@ -191,18 +212,3 @@ class _WithoutText(ast.NodeTransformer):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             node.body = node.body[ast.get_docstring(node, clean=False) is not None :]
         return super().generic_visit(node)
-
-
-def _imported(path: Path, tree: ast.Module, root: Path) -> Iterator[Path]:
-    """The files below root that the file at `path` imports, anywhere in it."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom):
-            folder = path.parents[node.level - 1] if node.level else root
-            module = folder.joinpath(*(node.module or "").split("."))
-            names = [module, *(module / alias.name for alias in node.names)]
-        elif isinstance(node, ast.Import):
-            names = [root.joinpath(*alias.name.split(".")) for alias in node.names]
-        else:
-            continue
-        files = [file for name in names for file in (name.with_suffix(".py"), name / "__init__.py")]
-        yield from (file for file in files if file.is_file())

@@ -3,6 +3,7 @@
 Modules that are slow to import are imported inside the commands.
 """
 
+import gc
 import signal
 import sys
 from collections.abc import Callable
@@ -101,6 +102,7 @@ for command in ONE_SCENE + OTHERS:
 
 
 def main() -> None:
+    gc.set_threshold(5000)  # importing makes many objects and no garbage
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # what its encoding lacks, as in LANG=C, ends no command

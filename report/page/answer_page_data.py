@@ -4,7 +4,7 @@ import pandas as pd
 
 from report.document.numbers import listed, out_of, position, significant
 from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
-from report.page.page_figures import as_items, map_figure
+from report.page.page_figures import map_item
 from report.page.page_file import Data, banner
 from report.results.answer_record import Answer, fasteners, pair_name
 from report.results.series_results import Array
@@ -100,7 +100,7 @@ def _with_maps(records: list[Data], lines: list[list[str]], maps: Data) -> Data:
         "views": [("maps", "Gap maps")] if maps["maps"] else [],
         "controls": map_controls(maps),
         "maps": maps,
-        "figures": as_items({"map": map_figure(hover_names(maps))}),
+        "figures": {"map": map_item(hover_names(maps))},
     }
 
 

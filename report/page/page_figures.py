@@ -1,13 +1,16 @@
 """The Bokeh figures of a page, as JSON: their looks are here, and plots.js fills in what is asked for.
 
-Bokeh is imported when a page is written: it takes a third of a second.
+Bokeh takes half a second to import: the map, which all pages show, and the scripts are kept in the cache.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from problems.storage import digest, load_or_make
 from report.results.series_results import Array
 
 if TYPE_CHECKING:
@@ -18,11 +21,32 @@ TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
 CURVE_LOOKS = (("#0072B2", "solid"), ("#D55E00", "dashed"))
 
 
-def as_items(figures: dict[str, Any]) -> dict[str, Any]:
-    """The figures as JSON items for `Bokeh.embed.embed_item`; a list of figures becomes a list of items.
+def scripts() -> str:
+    """BokehJS, for a page in one file."""
 
-    Bokeh numbers its models through the process; here they are numbered anew, so that equal data give equal
-    pages.
+    def made() -> str:
+        from bokeh.resources import Resources
+
+        return "\n".join(Resources(mode="inline", components=["bokeh"], minified=True).js_raw)
+
+    return str(_kept(["scripts"], made))
+
+
+def map_item(names: list[str]) -> Any:
+    """The item of `map_figure`."""
+    return _kept(["map", *names], lambda: item(map_figure(names), "map"))
+
+
+def _kept(what: list[str], make: Callable[[], Any]) -> Any:
+    key = digest("page", version("bokeh"), Path(__file__).read_bytes(), what)
+    return load_or_make(key, lambda: ({}, {"made": make()}))[1]["made"]
+
+
+def item(plot: figure, name: str) -> Any:
+    """A figure as JSON for `Bokeh.embed.embed_item`.
+
+    Bokeh numbers its models through the process; here they are numbered anew, behind `name`, which differs
+    among the figures of a page, so that equal data give equal pages.
     """
     from bokeh.embed import json_item
 
@@ -32,19 +56,16 @@ def as_items(figures: dict[str, Any]) -> dict[str, Any]:
         match value:
             case dict():
                 return {
-                    key: numbers.setdefault(item, f"m{len(numbers)}")
+                    key: numbers.setdefault(inner, f"{name}-{len(numbers)}")
                     if key in ("id", "root_id")
-                    else renumbered(item)
-                    for key, item in value.items()
+                    else renumbered(inner)
+                    for key, inner in value.items()
                 }
             case list():
-                return [renumbered(item) for item in value]
+                return [renumbered(inner) for inner in value]
         return value
 
-    return {
-        name: renumbered([json_item(each) for each in made] if isinstance(made, list) else json_item(made))
-        for name, made in figures.items()
-    }
+    return renumbered(json_item(plot))
 
 
 def map_figure(names: Iterable[str]) -> figure:

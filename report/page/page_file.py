@@ -15,6 +15,7 @@ import pandas as pd
 
 from report.analysis.checks import commits_text
 from report.document.escape import plain, quoted, script_json, short
+from report.page.page_figures import scripts
 from report.results.series_results import Array
 
 HERE = Path(__file__).parent
@@ -27,8 +28,6 @@ Data = dict[str, Any]
 
 def write(path: Path, title: str, data: Data, directory: Path | None = None) -> Path:
     """Write the page and return its path. directory : of the rows, as the page's commands name it."""
-    from bokeh.resources import Resources
-
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined
     )
@@ -41,7 +40,7 @@ def write(path: Path, title: str, data: Data, directory: Path | None = None) -> 
         "title": heading,
         "style": (HERE / "page.css").read_text("utf-8"),
         "data": script_json(scripted),
-        "bokeh": "\n".join(Resources(mode="inline", components=["bokeh"], minified=True).js_raw),
+        "bokeh": scripts(),
         "scripts": [(HERE / f"{name}.js").read_text("utf-8") for name in SCRIPTS],
     }
     path.write_text(environment.get_template("page.html.j2").render(content), "utf-8")

@@ -14,7 +14,7 @@ from report.document.numbers import counted, out_of, significant, tidy_power
 from report.figures import style
 from report.figures.junction_maps import Map, drawn, rooted
 from report.page.contact_maps import hover_names, map_controls, series_maps
-from report.page.page_figures import as_items, exceedance_figure, map_figure
+from report.page.page_figures import exceedance_figure, item, map_item
 from report.page.page_file import Data, banner
 from report.page.page_file import write as write_page
 from report.results.series_results import (
@@ -203,5 +203,8 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
         "views": [("maps", "Gap maps")] if maps["maps"] else [],
         "controls": map_controls(maps),
         "maps": maps,
-        "figures": as_items({"map": map_figure(hover_names(maps)), "curves": exceedance_figure(curves)}),
+        "figures": {
+            "map": map_item(hover_names(maps)),
+            "curves": item(exceedance_figure(curves), "curves"),
+        },
     }
