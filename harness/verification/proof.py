@@ -47,7 +47,7 @@ MAX_PASSES = 30
 MAX_WORSE = 2  # passes in a row that do not halve the bound
 MAX_PRODUCTS = 60  # of conjugate gradients in a pass
 REDUCTION = 1e-6  # of y_C in a pass
-AT_ROUNDING = 1.5  # of the rounding of x to float64: a bound that no further pass improves
+AT_ROUNDING = 1.5  # of what roundings alone give: a bound that no further pass halves
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Proof:
         """A refined answer with its bound for each load case.
 
         lams : forces (m,) N. xs : about their displacements (n,) mm, computed by default. enough_mm : a bound
-        that needs no further pass, as does none that is about the rounding of x.
+        that needs no further pass, as does none that is about what the roundings of x, r and s give.
         """
         units, load = self.balanced, self.balanced.load(loads)
         load = LoadCase(np.broadcast_to(load.f, (len(units.D), len(loads))), load.g)
@@ -131,7 +131,8 @@ class Proof:
         best = [Proven(x2[:, k], lam2[:, k], np.inf) for k in range(len(loads))]
         worse = np.zeros(len(loads), dtype=int)  # passes since a bound was halved
         cases = np.arange(len(loads))  # the load case of each column
-        bounds, rounding = self.bounds(x2, lam2, r, s, Sharpness.TRANSLATED if quick else sharpness)
+        bounds, _ = self.bounds(x2, lam2, r, s, Sharpness.TRANSLATED if quick else sharpness)
+        rounding = np.zeros(len(loads))  # the first pass is always worth it
         for step in range(MAX_PASSES):
             enough = np.maximum(enough_mm, AT_ROUNDING * rounding)
             going = np.zeros(len(cases), dtype=bool)
@@ -168,7 +169,7 @@ class Proof:
         s: Enclosure,
         sharpness: Sharpness = Sharpness.PLAIN,
     ) -> tuple[Vector, Vector]:
-        """The bound of each column (k,) mm, and its part that is due to the rounding of x to float64."""
+        """The bound of each column (k,) mm, and its part that is due to the roundings of x, r and s."""
         units, at_junction = self.balanced, self.balanced.assembly.at_junction
         pressing = lam.hi > 0
         delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
@@ -184,7 +185,8 @@ class Proof:
         error = SAFE * (force / np.sqrt(self.kappa) + distance + missed * stretch)
         bounds = SAFE * (reach * error + D * lo).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
         valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
-        return np.where(valid, bounds, np.inf), (D * lo).max(axis=0, initial=0.0)
+        rounding = length(r.error) / np.sqrt(self.kappa) + length(uncertain) * stretch
+        return np.where(valid, bounds, np.inf), (reach * rounding + D * lo).max(axis=0, initial=0.0)
 
     def _translated(self, delta: Matrix, uncertain: Matrix) -> tuple[Matrix, Matrix, Vector]:
         """δ − Aᵀz (m, k), how uncertain it is, and ‖z‖_K or more (k,)."""

@@ -121,7 +121,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         ),
         " + ETA * x.hi.any(axis=0)": ("",),
         " & ~(lam.hi < 0).any(axis=0)": ("",),
-        "np.where(valid, bounds, np.inf), (D": ("bounds, (D",),
+        "np.where(valid, bounds, np.inf), (reach": ("bounds, (reach",),
         "-(y + units.At @ w), 0.0)": ("-y, 0.0)",),
         "not (bounds[column] <= enough[column]": ("not (False",),
         "dlam = np.maximum(dlam, -lam2.hi)": ("pass",),
