@@ -10,7 +10,7 @@ from entry (i, j + 1): with b as its leading dimension, each block is an ordinar
 """
 
 from contextlib import nullcontext
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -26,31 +26,66 @@ NARROW = 64  # of a band: it is solved by dpbtrs
 WIDE = 700  # of a band: its factor gains from a second thread
 FEW = 2  # right-hand sides, for which dpbtrs is as fast
 COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
+WINDOW = 8  # half-bandwidths of columns that are factored at a time where no factor is kept
 
 Entries = NDArray[np.floating[Any]]
 
 
 def half_bandwidth(K: sp.csc_array) -> int:
-    """max |i − j| over the entries of K."""
-    columns = np.repeat(np.arange(K.shape[1], dtype=K.indices.dtype), np.diff(K.indptr))
-    return int((K.indices - columns).max(initial=0))
+    """max i − j over the entries of K, at least 0."""
+    filled = np.flatnonzero(np.diff(K.indptr))
+    lowest = np.maximum.reduceat(K.indices, K.indptr[filled]) if filled.size else filled
+    return int((lowest - filled).max(initial=0))
 
 
-def lower_band(K: sp.csc_array) -> Matrix:
-    """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth. K : without duplicates."""
-    size, width = K.shape[0], half_bandwidth(K)
+def lower_band(K: sp.csc_array, width: int) -> Matrix:
+    """(b + 1, N) column-major, K[j + d, j] in row d. K : without duplicates. width : b."""
+    size = K.shape[0]
     band = np.empty((width + 1, size), order="F")  # in large pages, where zeros() would be given small ones
-    entries = band.ravel(order="K")
     for start in range(0, size, COLUMNS_AT_A_TIME):
-        stop = min(start + COLUMNS_AT_A_TIME, size)
-        band[:, start:stop] = 0.0
-        stored = slice(K.indptr[start], K.indptr[stop])
-        columns = np.repeat(np.arange(start, stop), np.diff(K.indptr[start : stop + 1]))
-        rows, values = K.indices[stored], K.data[stored]
-        lower = rows >= columns
-        # row − column + column (width + 1)
-        entries[columns[lower] * width + rows[lower]] = values[lower]
+        _fill(band[:, start : start + COLUMNS_AT_A_TIME], K, start)
     return band
+
+
+def _fill(band: Matrix, K: sp.csc_array, start: int) -> None:
+    """Write columns of K, from `start` on, into a band."""
+    stop, entries = start + band.shape[1], band.ravel(order="K")
+    entries[:] = 0.0
+    stored = slice(K.indptr[start], K.indptr[stop])
+    columns = np.repeat(np.arange(stop - start), np.diff(K.indptr[start : stop + 1]))
+    below, values = K.indices[stored] - start - columns, K.data[stored]
+    lower = below >= 0
+    entries[columns[lower] * len(band) + below[lower]] = values[lower]
+
+
+def factor_norm(K: sp.csc_array, width: int, s: float) -> float | None:
+    """‖|L||L|ᵀ‖_∞ ≥ ‖|L||L|ᵀ‖₂ of K − sI = LLᵀ, up to a relative rounding of 4bu; None where there is no L.
+
+    L is made some columns at a time and not kept, as its memory would take longer than its entries. The
+    columns that follow are replaced by a multiple of I, so large that it stays definite where K − sI is.
+    """
+    size, most = K.shape[0], WINDOW * max(width, NARROW)
+    window, sums = np.empty((width + 1, most + width), order="F"), np.zeros(K.shape[0] + width)
+    taken = np.zeros((width, width))  # by the last columns from those that follow
+    for start in range(0, size, most):
+        count = min(most, size - start)
+        band, near = window[:, : count + width], min(width, count)
+        _fill(band[:, :count], K, start)
+        band[0, :count] -= s
+        band[:, count:] = 0.0
+        band[0, count:] = 2 * (width + 1) * abs(band[0, :count]).max()
+        _part(band, 0, 0, near, near)[...] -= np.tril(taken[:near, :near])
+        L, info = band_cholesky(band)
+        if info:
+            return None
+        if start + count < size:
+            triangle = np.triu(_part(L, count, count - width, width, width))
+            taken = triangle @ triangle.T
+        np.abs(L, out=L)
+        L[:, count:] = 0.0
+        of_columns = blas.dtbmv(width, L, np.ones(count + width), lower=1, trans=1)
+        sums[start : start + count + width] += blas.dtbmv(width, L, of_columns, lower=1)
+    return float(sums.max())
 
 
 def band_cholesky(band: Matrix) -> tuple[Matrix, int]:
@@ -76,19 +111,8 @@ def band_solve(L: Matrix, b: Matrix) -> Matrix:
     if b.ndim == 1 or b.shape[1] <= FEW or width < NARROW:
         x: Matrix = lapack.dpbtrs(L, b, lower=1)[0]
         return x
-    X, edges, entries = (
-        np.array(b, dtype=float, order="C"),
-        [*range(0, size, width), size],
-        L.ravel(order="K"),
-    )
-
-    def part(row: int, column: int, rows: int, columns: int) -> Matrix:
-        """A part of L from (row, column) on, not copied; entries outside the band are arbitrary."""
-        step = entries.itemsize
-        return np.ndarray(
-            (rows, columns), float, entries, (column * width + row) * step, (step, width * step)
-        )
-
+    X, edges = np.array(b, dtype=float, order="C"), [*range(0, size, width), size]
+    part = partial(_part, L)
     for start, stop in pairwise(edges):
         block, after, count = X[start:stop], X[stop : stop + width], min(width, size - stop)
         diagonal = part(start, start, stop - start, stop - start)
@@ -105,6 +129,13 @@ def band_solve(L: Matrix, b: Matrix) -> Matrix:
         diagonal = part(start, start, stop - start, stop - start)
         blas.dtrsm(1.0, diagonal, block.T, side=1, lower=1, overwrite_b=1)
     return X
+
+
+def _part(band: Matrix, row: int, column: int, rows: int, columns: int) -> Matrix:
+    """A part of the matrix of a band from (row, column) on, not copied; entries outside are arbitrary."""
+    entries, width = band.ravel(order="K"), len(band) - 1
+    step = entries.itemsize
+    return np.ndarray((rows, columns), float, entries, (column * width + row) * step, (step, width * step))
 
 
 def band_blocks(

@@ -7,10 +7,9 @@ from typing import Any, Self
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import blas
 
 from . import Indices, Matrix, U, Vector, gamma
-from .band_factor import band_cholesky, band_solve, lower_band
+from .band_factor import band_cholesky, band_solve, factor_norm, lower_band
 from .block import NotPositiveDefinite, SparseBlock, scaled
 from .selected_inverse import BlockPart
 
@@ -31,7 +30,7 @@ class BandedBlock(SparseBlock):
     @cached_property
     def L(self) -> Matrix:
         """(b + 1, N), column-major: L[j + d, j] in row d. Raises NotPositiveDefinite."""
-        band = lower_band(self._ordered(self.matrix))
+        band = lower_band(self._ordered(self.matrix), self.width)
         smallest = self.lost * band[0]
         L, info = band_cholesky(band)
         lost = [info - 1] if info else np.flatnonzero(L[0] ** 2 <= smallest)
@@ -58,19 +57,10 @@ class BandedBlock(SparseBlock):
 
     def shifted(self, D: Vector, s: float) -> float | None:
         """As for a dense block, but no sum has more than b + 1 terms (Higham 2002, theorem 10.3)."""
-        band = lower_band(self._ordered(scaled(self.matrix, D, D)))
-        band[0] -= s
-        largest = float(abs(band[0]).max())
-        L, info = band_cholesky(band)
-        return None if info else gamma(2 * (len(L) + 1)) * _norm(L) + U * (largest + abs(s))
+        M = self._ordered(scaled(self.matrix, D, D))
+        norm, largest = factor_norm(M, self.width, s), float(abs(M.diagonal() - s).max())
+        return None if norm is None else gamma(2 * (self.width + 2)) * norm + U * (largest + abs(s))
 
     def local_compliance(self, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
         rows = A if self.order is None else sp.csc_array(A[self.order])
         return BlockPart.of(self.L, rows, windows, single)
-
-
-def _norm(L: Matrix) -> float:
-    """‖|L||L|ᵀ‖_∞ ≥ ‖|L||L|ᵀ‖₂, up to a relative rounding of 4bu."""
-    np.abs(L, out=L)
-    width, v = len(L) - 1, np.ones(L.shape[1])
-    return float(blas.dtbmv(width, L, blas.dtbmv(width, L, v, lower=1, trans=1), lower=1).max())

@@ -17,7 +17,7 @@ from problems.forms import FORMS
 from problems.forms.assembly import Matrix
 from problems.scene_files import read_scene
 from problems.stiffness import band_factor
-from problems.stiffness.band_factor import half_bandwidth, lower_band
+from problems.stiffness.band_factor import factor_norm, half_bandwidth, lower_band
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.cholmod import Cholmod
@@ -91,13 +91,24 @@ def test_small_matrices_of_any_band(n: int, half: int, seed: int) -> None:
     dense, b = K.toarray(), random.standard_normal(n)
     rows, columns = dense.nonzero()
     assert half_bandwidth(K) == max(rows - columns)
-    band = lower_band(K)
+    band = lower_band(K, half_bandwidth(K))
     assert band.shape == (half_bandwidth(K) + 1, n)
     for d in range(len(band)):
         np.testing.assert_array_equal(band[d, : n - d], np.diag(dense, -d))
     backwards = BandedBlock(K, half_bandwidth(K), np.arange(n)[::-1])
     for factor in (sparse_block(K), GeneralBlock(K, n), backwards):
         close(factor.solve(b), np.linalg.solve(dense, b))
+
+
+@pytest.mark.parametrize(("n", "half"), [(5, 4), (520, 3), (700, 70)])
+def test_a_factor_that_is_not_kept_has_the_norm_of_the_dense_one(n: int, half: int) -> None:
+    """It is made in pieces, the last one narrower than the band."""
+    K = band_matrix(np.random.default_rng(0), n, half)
+    dense, width = K.toarray(), half_bandwidth(K)
+    least = float(np.linalg.eigvalsh(dense)[0])
+    L = abs(np.linalg.cholesky(dense - least / 2 * np.eye(n)))
+    assert factor_norm(K, width, least / 2) == pytest.approx((L @ L.T).sum(axis=1).max(), rel=1e-10)
+    assert factor_norm(K, width, least * (1 + 1e-6)) is None
 
 
 def test_the_size_of_a_factor_is_known_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
