@@ -8,10 +8,13 @@ Whoever writes a file spells them out for it: `markdown`, `script_json`, `csv_ce
 import json
 import math
 import re
+from collections.abc import Iterator
 from hashlib import sha256
 from typing import Any
 
 import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
@@ -127,10 +130,19 @@ def picture(drawing: Figure) -> Figure:
                 texts = [text.get_text() for text in axis.get_ticklabels()]
                 if (spelled := [_spelled(text) for text in texts]) != texts:
                     axis.set_ticks(axis.get_majorticklocs(), spelled)
-    for text in drawing.findobj(Text):
+    for text in _texts(drawing):
         if (words := _spelled(text.get_text())) != text.get_text():
             text.set_text(words)
     return drawing
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """All texts but those of ticks, which matplotlib makes when it draws."""
+    if isinstance(artist, Text):
+        yield artist
+    children = [artist.label] if isinstance(artist, Axis) else artist.get_children()
+    for child in children:
+        yield from _texts(child)
 
 
 def _spelled(text: str) -> str:

@@ -16,7 +16,7 @@ from . import style
 from .gap_section import around_worst
 from .junction_maps import Array
 
-LINES = 60  # of each face, along either side
+LINES = 40  # of each face, along either side
 NARROWEST, HEIGHT = 0.4, 0.35  # of the view, to its longer side
 TINY = float(np.finfo(float).tiny)
 

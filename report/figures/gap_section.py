@@ -13,6 +13,8 @@ from report.document.numbers import significant
 from . import style
 from .junction_maps import Array, grid_of
 
+PLACE = {"left": 0.085, "right": 0.99, "bottom": 0.28, "top": 0.91, "wspace": 0.04}  # of the figure
+
 
 def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure | None:
     """The faces along both grid lines through the largest gap; None if the contacts are on no grid."""
@@ -28,9 +30,9 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
         f"along y at x = {significant(x[column])} mm": ("y, mm", y, np.arange(len(y)) * len(x) + column),
     }
     with style.applied():
-        figure = style.figure(3.0)
+        figure = Figure(figsize=(style.WIDTH, 3.0))
         node = np.argsort(place)
-        panels = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
+        panels = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1), gridspec_kw=PLACE)
         for axes, (title, (name, at, line)) in zip(panels, lines.items(), strict=True):
             _draw(axes, at, {when: [face[node[line]] for face in both] for when, both in faces.items()})
             axes.set(title=title, xlabel=name)
@@ -38,7 +40,7 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
         names = pair["pair"] if len(pair["pair"]) == 2 else ["one side", "the other"]
         handles, _ = panels[0].get_legend_handles_labels()
         labels = [f"{names[0]}, after", f"{names[1]}, after", "gap left", "before"]
-        figure.legend(handles, labels, loc="outside lower left", ncols=4)
+        figure.legend(handles, labels, loc="lower left", ncols=4)
     return figure
 
 

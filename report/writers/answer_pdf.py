@@ -68,6 +68,6 @@ class _Page:
         height = WIDTH * image.shape[0] / image.shape[1] * A4[0] / A4[1]
         shown = min(height, TALLEST)
         axes = self.figure.add_axes((LEFT, self.at - shown, WIDTH * shown / height, shown))
-        axes.imshow(image)
+        axes.imshow(image, interpolation="none")
         axes.set_axis_off()
         self.at -= shown + LINE
