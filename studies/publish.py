@@ -51,7 +51,7 @@ SERIES = {
 #: In the order of measurement; the other suites are for a user's own runs and for the CI.
 NAMES = (
     *("default", "speed", "libraries", "series", "stream", *SERIES, "methods", "scaling"),
-    *("hard", "hard-full", "drawn", "outside", "paper", "accuracy"),
+    *("hard", "hard-full", "drawn", "hard-sparse", "outside", "paper", "accuracy"),
 )
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
 #: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.

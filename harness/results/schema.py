@@ -37,8 +37,8 @@ DENSE_FORMS = ("dual", "primal")
 
 #: The scenes that are rungs of ladders: hard/<ladder>/<rung> and hard-full/<ladder>/<rung>.
 LADDERS = ("hard/", "hard-full/")
-#: Those drawn at random: drawn/<n>/<k>.
-DRAWN = "drawn/"
+#: Those drawn at random: drawn/<n>/<k>, and sparse problems, sparse/<family>/<n>-<k>.
+DRAWN, SPARSE = "drawn/", "sparse/"
 
 #: The steps of a measurement, s; `form_s` is what the form costs per load case beside the solver.
 STEPS = ("convert_s", "prepare_s", "setup_s", "solve_s", "form_s")

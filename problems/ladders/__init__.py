@@ -6,6 +6,7 @@ rungs by name, the easiest first, and a rung is a function that makes the same s
     RUNGS        hard/<ladder>/<rung>
     FULL_SIZE    hard-full/<ladder>/<n>-<rung>, at the sizes of the paper: n = 4386, 6112 and 11308
     OUTSIDE      outside/<problem>/<size>, problems that others wrote, with printed optima
+    SPARSE       sparse/<family>/<n>-<k>, sparse problems of n unknowns, drawn anew for each version
 """
 
 import importlib
@@ -17,7 +18,7 @@ from functools import cache
 from problems.model.scene import ManufacturedScene, Scene
 
 #: The beginning of scenes' names → the name of their table in a file.
-PREFIXES = {"hard/": "RUNGS", "hard-full/": "FULL_SIZE", "outside/": "OUTSIDE"}
+PREFIXES = {"hard/": "RUNGS", "hard-full/": "FULL_SIZE", "outside/": "OUTSIDE", "sparse/": "SPARSE"}
 LADDERS = ("hard/", "hard-full/")  # whose limit follows their conditioning
 
 Ladder = Mapping[str, Callable[[], Scene]]

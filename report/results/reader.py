@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from harness.results.schema import DRAWN, LADDERS
+from harness.results.schema import DRAWN, LADDERS, SPARSE
 from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
 from report.results.rows import cells_of
@@ -80,7 +80,7 @@ class Results:
         one by one, or "all".
         """
         names = self.rows["scene"].str
-        own = {"ladders": names.startswith(LADDERS), "drawn": names.startswith(DRAWN)}
+        own = {"ladders": names.startswith(LADDERS), "drawn": names.startswith((DRAWN, SPARSE))}
         many = own["drawn"] & (self.rows.loc[own["drawn"], "scene"].nunique() > MOST_SHOWN)
         others = ~(own["ladders"] | many)
         rows = self.rows if what == "all" else self.rows[own.get(what, others)].reset_index(drop=True)

@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.results.schema import ANSWERED
+from harness.results.schema import ANSWERED, SPARSE
 from report.analysis.standings import best_tolerances, shown
 from report.document.blocks import Block, Column, Figure, Section, Table, number, word
 from report.document.numbers import counted, power, whole
@@ -18,7 +18,8 @@ PANEL = 3.0  # inches
 
 def section(results: Results) -> Section | None:
     """Every method with the best of its tolerances on each scene."""
-    cells = results.cells[results.cells["status"] != "unsupported"].dropna(subset=["n", "tolerance"])
+    cells = results.cells[~results.cells["scene"].str.startswith(SPARSE)]
+    cells = cells[cells["status"] != "unsupported"].dropna(subset=["n", "tolerance"])
     if cells.empty or cells["case"].notna().any():  # load cases of a series have a section of their own
         return None
     seconds = (cells["setup_s"].fillna(0.0) + cells["solve_s"]).where(cells["verdict"].isin(ANSWERED))
