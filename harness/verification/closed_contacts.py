@@ -1,32 +1,45 @@
-"""Makes the gaps of closed contacts zero: Q_CC dλ = −y_C by an approximate inverse M ≈ Q⁻¹."""
+"""Makes the gaps of closed contacts zero: Q_CC dλ = −y_C by M ≈ Q⁻¹, or by a factor of a dense Q_CC."""
 
 from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from problems.forms.assembly import Mask, Vector
+from problems.forms.assembly import Mask, Matrix, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
+from problems.forms.closed_factor import ClosedFactor
 from problems.forms.prepared import Prepared
+from problems.stiffness.dense_block import product
 
 MAX_SETS = 10  # contact sets tried with M for one load case
 
 
 @dataclass(frozen=True)
 class ScaledInverse:
-    """M ≈ Q⁻¹, None if it cannot be made, and about the diagonal of Q (m,), in units R (m,) of contacts."""
+    """M ≈ Q⁻¹, None if it cannot be made, and about the diagonal of Q (m,), in units R (m,) of contacts.
+
+    Q : (m, m) where it is dense and has no M.
+    """
 
     M: BandedInverse | None
     diagonal: Vector
     R: Vector
+    Q: Matrix | None = None
 
     @classmethod
     def of(cls, prepared: Prepared, R: Vector) -> "ScaledInverse":
         with suppress(np.linalg.LinAlgError):  # Q is not positive definite, but for rounding
             if len(R):
                 plain = prepared.approximate_inverse
-                return cls(plain.M, plain.diagonal * R**2, R)
+                Q = prepared.Q if plain.M is None and prepared.assembly.K.dense else None
+                return cls(plain.M, plain.diagonal * R**2, R, Q)
         return cls(None, np.ones(len(R)), R)
+
+    def forces(self, v: Vector, C: Mask) -> Vector:
+        """u (m,) with about (Qu)_C = v_C: M v, or Q_CC⁻¹v_C. There is M or Q."""
+        if self.Q is None:
+            return self.product(v)
+        return ClosedFactor(self.Q).solve(C, v / self.R) / self.R
 
     def product(self, v: Vector) -> Vector:
         """M v."""
@@ -35,8 +48,13 @@ class ScaledInverse:
         u[self.M.order] = self.M.product((v / self.R)[self.M.order])
         return u / self.R
 
-    def factor(self, N: Mask) -> BandFactor | None:
-        """The factor of M_NN; None without M, or if rounding makes M_NN indefinite."""
+    def factor(self, N: Mask) -> BandFactor | ClosedFactor | None:
+        """The factor of M_NN or Q_CC; None without both, or if rounding makes it indefinite."""
+        if self.Q is not None:
+            with suppress(np.linalg.LinAlgError):
+                factor = ClosedFactor(self.Q)
+                factor.solve(~N, np.zeros(len(N)))
+                return factor
         if self.M is not None:
             with suppress(np.linalg.LinAlgError):
                 return self.M.factor(N[self.M.order])
@@ -68,9 +86,16 @@ class ClosedContacts:
         """About Q_CC⁻¹ v, for v (m,) zero outside C; v itself without M."""
         return v if self.factor is None else np.where(self.C, self._solved(self.factor, v, 0.0), 0.0)
 
-    def _solved(self, factor: BandFactor, v: Vector, lam: Vector | float) -> Vector:
-        """u with (M⁻¹u)_C = v_C and u_N = λ_N: u = M(v − t), M_NN t_N = (M v)_N − λ_N."""
+    def _solved(self, factor: BandFactor | ClosedFactor, v: Vector, lam: Vector | float) -> Vector:
+        """u with (M⁻¹u)_C = v_C and u_N = λ_N: u = M(v − t), M_NN t_N = (M v)_N − λ_N.
+
+        With Q, Q_CC u_C = v_C − Q_CN λ_N; u_N counts for nothing.
+        """
         inverse = self.inverse
+        if isinstance(factor, ClosedFactor):
+            others = np.where(self.C, 0.0, lam * inverse.R)
+            carried = product(factor.Q, others) if others.any() else 0.0
+            return factor.solve(self.C, v / inverse.R - carried) / inverse.R
         assert inverse.M is not None
         u, t = inverse.product(v), np.empty_like(v)
         t[inverse.M.order] = factor.solve((np.where(self.C, 0.0, u - lam) * inverse.R)[inverse.M.order])

@@ -10,11 +10,11 @@ I − P is nonexpansive. So, in balanced units (balanced_units.py), with κ ≤ 
 
     |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).                                     (plain)
 
-The factor D_i/√κ may be replaced by √(K⁻¹)_ii (compliant). Any other d with Aᵀd = δ bounds the second term as
-well: d = z + A(AᵀA)⁻¹(δ − Aᵀz) is short for z = K⁻¹AMδ, M ≈ Q⁻¹. This costs one solution with K and saves
-the refinement of many load cases:
+The factor D_i/√κ may be replaced by √(K⁻¹)_ii (compliant). Any other d bounds the second term too if x and
+λ are exact for the gap g + Aᵀd: d = z + A(AᵀA)⁻¹δ', δ' the δ of s + Aᵀz, is short for z = K⁻¹AMδ, M ≈ Q⁻¹,
+or z = K⁻¹A_C Q_CC⁻¹δ_C. This costs one solution with K and saves the refinement of many load cases:
 
-    |x_i − x*_i| ≤ √(K⁻¹)_ii ( ‖r‖₂/√κ + ‖z‖_K + ‖δ − Aᵀz‖₂ √(‖K‖_∞/σ²) ).                    (translated)
+    |x_i − x*_i| ≤ √(K⁻¹)_ii ( ‖r‖₂/√κ + ‖z‖_K + ‖δ'‖₂ √(‖K‖_∞/σ²) ).                         (translated)
 
 Nothing is assumed about the contact set: weakly active contacts need no special treatment, and it does not
 matter where λ came from. Refinement of x and λ_C in twice the working precision makes the bound small:
@@ -90,8 +90,8 @@ class Proof:
 
     @cached_property
     def compliance(self) -> float:
-        """max (K⁻¹)_ii or more, mm/N; infinite without M or where no bound is cheap."""
-        if self.inverse.M is None:
+        """max (K⁻¹)_ii or more, mm/N; infinite without M and Q, or where no bound is cheap."""
+        if self.inverse.M is None and self.inverse.Q is None:
             return np.inf
         return cached_figure(self.balanced.prepared, "compliance", self._largest_compliance)
 
@@ -171,15 +171,15 @@ class Proof:
     ) -> tuple[Vector, Vector]:
         """The bound of each column (k,) mm, and its part that is due to the roundings of x, r and s."""
         units, at_junction = self.balanced, self.balanced.assembly.at_junction
-        pressing = lam.hi > 0
+        pressing, distance = lam.hi > 0, np.zeros(x.hi.shape[1])
+        if sharpness is Sharpness.TRANSLATED:
+            s, distance = self._translated(s, pressing)
         delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
         uncertain = s.error * (pressing | (s.value < s.error))
         D, lo = at_junction(units.D), abs(at_junction(x.lo))
-        reach, distance = D / np.sqrt(self.kappa), np.zeros(x.hi.shape[1])
+        reach = D / np.sqrt(self.kappa)
         if sharpness is not Sharpness.PLAIN:
             reach = np.minimum(reach, np.sqrt(self.compliance))
-        if sharpness is Sharpness.TRANSLATED:
-            delta, uncertain, distance = self._translated(delta, uncertain)
         missed, force = length(abs(delta) + uncertain), length(abs(r.value) + r.error)
         stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0
         error = SAFE * (force / np.sqrt(self.kappa) + distance + missed * stretch)
@@ -188,14 +188,15 @@ class Proof:
         rounding = length(r.error) / np.sqrt(self.kappa) + length(uncertain) * stretch
         return np.where(valid, bounds, np.inf), (reach * rounding + D * lo).max(axis=0, initial=0.0)
 
-    def _translated(self, delta: Matrix, uncertain: Matrix) -> tuple[Matrix, Matrix, Vector]:
-        """δ − Aᵀz (m, k), how uncertain it is, and ‖z‖_K or more (k,)."""
-        units = self.balanced
-        z = units.solve(units.A @ np.column_stack([self.inverse.product(column) for column in delta.T]))
-        rest = delta - units.At @ z
+    def _translated(self, s: Enclosure, pressing: Mask) -> tuple[Enclosure, Vector]:
+        """s + Aᵀz (m, k), and ‖z‖_K or more (k,). pressing (m, k) : where λ > 0."""
+        units, delta = self.balanced, np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
+        columns = zip(delta.T, pressing.T, strict=True)
+        z = units.solve(units.A @ np.column_stack([self.inverse.forces(*column) for column in columns]))
         roundings = int(np.diff(units.At.indptr).max(initial=0)) + 1
-        rounding = gamma(roundings) * (abs(delta) + abs(units.At) @ abs(z)) + roundings * ETA * z.any(axis=0)
-        return rest, uncertain + SAFE * rounding, units.energy(z)
+        sizes = abs(s.value) + abs(units.At) @ abs(z)
+        rounding = gamma(roundings) * sizes + roundings * ETA * z.any(axis=0)
+        return Enclosure(s.value + units.At @ z, s.error + SAFE * rounding), units.energy(z)
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float = 0.0) -> tuple[Matrix, Matrix]:

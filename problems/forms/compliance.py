@@ -3,7 +3,7 @@ narrow band, from Q itself or from local blocks of it.
 """
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -64,7 +64,7 @@ class ApproximateInverse:
 
 
 def of_dense(Q: DenseCompliance, nodes: Matrix | None) -> ApproximateInverse:
-    """M from Q itself: with a narrow band if e ← e − MQe converges fast, else from one window of all: Q⁻¹.
+    """M from Q itself, if e ← e − MQe converges fast with a narrow band.
 
     nodes : (m, 2) coordinates of the contacts, mm. Raises LinAlgError if Q is not positive definite.
     """
@@ -74,7 +74,12 @@ def of_dense(Q: DenseCompliance, nodes: Matrix | None) -> ApproximateInverse:
         M = banded_inverse(Q.Q, windows)
         if _contracts(M, Q):
             return ApproximateInverse(M, diagonal)
-    return ApproximateInverse(banded_inverse(Q.Q, Windows(np.arange(m), m)), diagonal)
+    return ApproximateInverse(None, diagonal)
+
+
+def whole_inverse(Q: DenseCompliance) -> BandedInverse:
+    """Q⁻¹, from one window of all contacts. Raises LinAlgError if Q is not positive definite."""
+    return banded_inverse(Q.Q, Windows(np.arange(len(Q.Q)), len(Q.Q)))
 
 
 def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
@@ -88,7 +93,9 @@ def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
     m, windows = assembly.m, _along_bands(assembly)
     few = m <= FEW
     if few and assembly.contact_nodes is None:
-        return of_dense(DenseCompliance(assembly.K.compliance(assembly.A)), None)
+        Q = DenseCompliance(assembly.K.compliance(assembly.A))
+        banded = of_dense(Q, None)
+        return replace(banded, M=banded.M or whole_inverse(Q))
     inverse = None
     if few or windows.work <= SETS * assembly.K.factorisation_flops:
         if _single_might_do(assembly):

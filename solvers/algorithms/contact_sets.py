@@ -115,6 +115,9 @@ class ContactSprings:
         A_C = self.A[:, np.flatnonzero(C)]
         return self.order.replaced(sp.csc_array(self.K + rho * (A_C @ A_C.T)))
 
+    def begin(self) -> None:
+        """Every set is factored anew."""
+
     def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
         """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
         A, lam, y, rho = self.A, start.lam, start.y, self.rho

@@ -35,6 +35,7 @@ from solvers.base import Answer, DualLoadCase, DualStart, Status
 from solvers.kkt import EPS, dual_answer, kkt_residual, largest_rounding, rounding_of
 
 from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
+from .closed_sets import ClosedSets
 from .contact_sets import ContactSprings, OpenFactor, banded_set, yielding_set
 
 MAX_SWEEPS = 200
@@ -72,7 +73,7 @@ class Case:
 
 @dataclass
 class Sweeps:
-    """Solves load cases of one assembly with M ≈ Q⁻¹, or with factorisations of K where there is no M.
+    """Solves load cases of one assembly with M ≈ Q⁻¹, or with factors of Q_CC or K where there is no M.
 
     diagonal : of Q, or about that, (m,) mm/N. order : of the contacts in M. compliance : the diagonal in this
     order. last : the cases solved last, from which the next ones start.
@@ -94,8 +95,10 @@ class Sweeps:
         self.squares = np.asarray(self.A.power(2).sum(axis=0)).ravel()
 
     @cached_property
-    def springs(self) -> ContactSprings:
+    def sets(self) -> ClosedSets | ContactSprings:
         """The replacement of M where there is none."""
+        if self.prepared.assembly.K.dense:
+            return ClosedSets(self.prepared.Q, self.prepared.assembly.contact_nodes)
         return ContactSprings(self.prepared)
 
     def __call__(self, loads: Sequence[DualLoadCase], tolerance: float) -> list[Answer]:
@@ -125,7 +128,7 @@ class Sweeps:
             zero = np.zeros(len(order))
             nothing = Case(load - load, zero > 0, TrialSolution(zero, zero, 0.0), doubt=0.0)
             (case,) = self._begun([nothing], [load])
-            case.C = case.C | (case.trial.y < 0) if self.M is not None else self.springs.first_set(load)
+            case.C = case.C | (case.trial.y < 0) if self.M is not None else self.sets.first_set(load)
         else:
             lam, y = start.lam[order], start.gap[order]
             solved = Case(start.load, self.compliance * lam > y, TrialSolution(lam, y, 0.0))
@@ -182,6 +185,8 @@ class Sweeps:
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
         order = self.order
         active = cases
+        if self.M is None:
+            self.sets.begin()
         for _ in range(MAX_SWEEPS):
             steps = []  # λ, whether the set is unchanged, and whether y follows by its change
             for case in active:
@@ -212,7 +217,7 @@ class Sweeps:
         """
         at: Callable[[Mask], TrialSolution]
         if self.M is None:
-            at = partial(self.springs.set, case.trial)
+            at = partial(self.sets.set, case.trial)
         else:
             case.factor = case.factor or OpenFactor(self.M)
             at = partial(banded_set, case.factor, case.trial)

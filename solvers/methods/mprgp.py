@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
+from problems.forms.compliance import DenseCompliance, whole_inverse
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
 from solvers.base import Answer, LoadCase, Problem, Status, failed
@@ -60,6 +61,8 @@ class Mprgp(Method):
         """The state with M and ᾱ, which takes 30 products; a failed answer if there is no M."""
         near = problem.prepared.approximate_inverse
         Q, diagonal, M = problem.prepared.compliance, near.diagonal, near.M
+        if M is None and isinstance(Q, DenseCompliance):
+            M = whole_inverse(Q)
         if M is None:
             return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
         alpha = 1.0 if self.preconditioner == "band" else step_length(Q, diagonal)

@@ -6,8 +6,8 @@ For a guess C of the contact set, the linear equations λ_N = 0, y_C = 0 are sol
 wrong sign changes sides: Newton's method on min(λ, y) = 0 (Hintermüller, Ito and Kunisch, SIAM J.
 Optim. 13:865–888, 2002), made finite by block principal pivoting. The equations are solved with a banded
 M ≈ Q⁻¹ and corrected by products with Q, whatever the form and the share of closed contacts
-(solvers/algorithms/newton_sweeps.py). Where Q does not decay along the joint, M is Q⁻¹; where contacts lie
-all over an area, the equations of each set are solved with a factorisation of K.
+(solvers/algorithms/newton_sweeps.py). Where Q does not decay along the joint, the equations of each set
+are solved with a factor of Q_CC (closed_sets.py), in the sparse form with one of K.
 """
 
 from collections.abc import Sequence

@@ -96,12 +96,12 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "np.sqrt(self.compliance)",
             "np.minimum(reach, self.compliance)",
         ),
-        "uncertain + SAFE * rounding, units": ("uncertain, units", "SAFE * rounding, units"),
-        "(abs(delta) + abs(units.At) @ abs(z))": ("abs(delta)",),
+        "s.error + SAFE * rounding), units": ("s.error), units", "SAFE * rounding), units"),
+        "abs(s.value) + abs(units.At) @ abs(z)": ("abs(s.value)",),
         " + roundings * ETA * z.any(axis=0)": ("",),
-        "np.where(pressing, -s.value, np.maximum(-s.value, 0.0))": (
-            "np.maximum(-s.value, 0.0)",
-            "np.where(pressing, -s.value, 0.0)",
+        "        delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))": (
+            "        delta = np.maximum(-s.value, 0.0)",
+            "        delta = np.where(pressing, -s.value, 0.0)",
         ),
         "s.error * (pressing | (s.value < s.error))": (
             "s.error * pressing",
@@ -113,7 +113,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "length(r.error)",
             "abs(r.value + r.error).max(axis=0)",
         ),
-        "reach, distance = D / np.sqrt(self.kappa), np": ("reach, distance = D, np",),
+        "reach = D / np.sqrt(self.kappa)\n": ("reach = D\n",),
         "(reach * error + D * lo)": (
             "(reach * error)",
             "(reach * error + D * lo / 2)",
@@ -158,6 +158,9 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "u - inverse.product(t * inverse.R)": ("u",),
         "(v / self.R)[self.M.order]": ("v[self.M.order]",),
         "0.0, u - lam) * inverse.R": ("0.0, u - lam)",),
+        "0.0, lam * inverse.R)": ("0.0, lam)",),
+        "solve(C, v / self.R) / self.R": ("solve(C, v) / self.R", "solve(C, v / self.R)"),
+        "v / inverse.R - carried) / inverse.R": ("v / inverse.R) / inverse.R", "v / inverse.R - carried)"),
     },
     "harness/verification/assess.py": {
         "SAFE * near + ": ("",),

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from small_problems import definite
 
 from harness.verification.assess import assess
+from harness.verification.closed_contacts import ClosedContacts, ScaledInverse
 from harness.verification.enclosure import DoubleDouble, Enclosure
 from harness.verification.proof import Proof, Sharpness
 from harness.verification.reference import proof_of
@@ -142,8 +144,8 @@ def test_what_is_not_known_of_the_residuals_counts(kind: Any) -> None:
 def test_a_gap_is_closed_by_a_translation(share: float) -> None:
     """By that share of it, the rest through ‖K‖/σ²; both count, and of a softer K neither does."""
     proof, _ = springs(np.asfortranarray, 4.0, 16.0)
-    exact = proof.inverse.product
-    object.__setattr__(proof.inverse, "product", lambda v: share * exact(v))
+    exact = proof.inverse.forces
+    object.__setattr__(proof.inverse, "forces", lambda v, C: share * exact(v, C))
     proof.kappa = 1 / 16
     at = array(1.001, 2.0), array(5.996)
     assert 1e-3 * (1 - 1e-12) <= bound(proof, LOAD, *at, sharpness=Sharpness.TRANSLATED) <= 1.05e-3
@@ -174,11 +176,27 @@ def test_a_corrected_answer_is_proven_by_the_compliance(monkeypatch: pytest.Monk
 def test_the_rounding_of_what_a_translation_leaves_counts() -> None:
     proof, _ = springs(np.asfortranarray, 4.0, 16.0)
     for size in (0.7, 1e-323):
-        delta = np.full((1, 1), size)
-        left, uncertain, _ = proof._translated(delta, np.full((1, 1), 1e-3) * size)
-        assert abs(left) <= uncertain
-        assert uncertain >= 1e-3 * size + 2 * gamma(2) * 0.99 * size
-        assert uncertain >= 2.0**-1074
+        gap = Enclosure(np.full((1, 1), -size), np.full((1, 1), 1e-3) * size)
+        left, _ = proof._translated(gap, np.ones((1, 1), dtype=bool))
+        assert abs(left.value) <= left.error
+        assert left.error >= 1e-3 * size + 2 * gamma(2) * 0.99 * size
+        assert left.error >= 2.0**-1074
+
+
+def test_a_first_correction_closes_the_gaps_of_a_dense_q() -> None:
+    """y_C + Q'dλ is zero on C where contacts off it lose a force, in units R that differ."""
+    random, R = np.random.default_rng(0), 2.0 ** np.arange(-6, 6)
+    Q = definite(12, 1, 10.0)
+    scaled = Q * R * R[:, None]
+    lam = np.full(12, 1e3)
+    y = np.where(np.arange(12) % 3, random.uniform(-1, 1, 12), 2 * np.diag(scaled) * lam)
+    start = ClosedContacts(ScaledInverse(None, np.diag(scaled), R, Q), y, lam)
+    assert 0 < start.C.sum() < 12
+    np.testing.assert_array_equal(start.dlam[~start.C], -1e3)
+    kept = start.C & (start.dlam > -1e3)
+    np.testing.assert_array_equal(kept, start.C)
+    after = y + scaled @ start.dlam
+    assert (abs(after) <= 1e-10 * abs(scaled) @ abs(start.dlam))[start.C].all()
 
 
 def test_many_answers_are_proven_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,67 @@
+"""Solutions of contact sets with factors of Q_CC: for a dense Q that has no banded inverse.
+
+From a point (λ, y) with y exact, a set C has λ⁺ = λ + dλ with
+
+    dλ_N = −λ_N,    Q_CC dλ_C = Q_CN λ_N − y_C,    y⁺ = y + Q dλ.
+
+The first set is found from few contacts to many: that of every 64th contact along the joint without the
+others, then of every 16th and every 4th, each from the last. A contact that carries a force there carries
+one among more contacts as a rule, or a neighbour does. So no set is much larger than the last, while those
+from all contacts that overlap without forces begin with most of them.
+"""
+
+import numpy as np
+
+from problems.forms.assembly import Mask, Matrix, Vector
+from problems.forms.banded_inverse import Windows
+from problems.forms.closed_factor import ClosedFactor
+from problems.stiffness.dense_block import product
+from solvers.base import DualLoadCase
+
+from .block_pivoting import TrialSolution, block_pivoting
+
+STRIDES = 64, 16, 4
+FEWEST = 12  # contacts of a first set that is worth while
+MOST_SETS = 30  # among some of the contacts
+UNCERTAINTY = 1e-9  # of |y_C| where a change starts: rounding
+
+
+class ClosedSets:
+    """Q (m, m) mm/N by columns. nodes : (m, 2) coordinates of the contacts, mm, if they are known."""
+
+    def __init__(self, Q: Matrix, nodes: Matrix | None = None) -> None:
+        self.Q, self.nodes = Q, nodes
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the last factor, so that no answer depends on those before."""
+        self.factor = ClosedFactor(self.Q)
+
+    def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
+        """λ⁺ and y⁺ of the set C, vectors in the order of Q. start : the point (λ, y), its rounding |y_C|."""
+        change, y = np.where(C, 0.0, -start.lam), start.y
+        if change.any():
+            y = y + product(self.Q, change)
+        closing = self.factor.solve(C, -y)
+        lam = np.where(C, start.lam + closing, 0.0)
+        y = np.where(C, 0.0, y + product(self.Q, closing))
+        return TrialSolution(lam, y, UNCERTAINTY * start.rounding)
+
+    def first_set(self, load: DualLoadCase) -> Mask:
+        """The closed contacts (m,) among every fourth one; where contacts are few, those that overlap."""
+        p, C = load.p, load.p > 0
+        order = Windows.of(self.nodes, len(p)).order
+        first = True
+        for some in (order[::stride] for stride in STRIDES if len(p) >= FEWEST * stride):
+            Q = np.asfortranarray(self.Q[np.ix_(some, some)])
+            begun = p[some] > 0 if first else C[some]
+            C = np.zeros(len(p), dtype=bool)
+            C[some] = _solved(Q, p[some], begun)
+            first = False
+        return C
+
+
+def _solved(Q: Matrix, p: Vector, C: Mask) -> Mask:
+    """The closed contacts of the dual program of Q and p, about; C : the first set."""
+    sets, nothing = ClosedSets(Q), TrialSolution(np.zeros_like(p), -p, 0.0)
+    return block_pivoting(lambda C: sets.set(nothing, C), C, np.diag(Q), 0.0, MOST_SETS).C

@@ -1,0 +1,89 @@
+"""Factors of Q_CC that follow the contact set, and `newton` where Q does not decay."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from small_problems import by_nnls, definite
+
+from problems.forms.assembly import DualLoadCase
+from problems.forms.closed_factor import ClosedFactor
+from problems.forms.prepared import dual_alone
+from solvers.algorithms.block_pivoting import TrialSolution
+from solvers.algorithms.closed_sets import ClosedSets
+from solvers.algorithms.newton_sweeps import Sweeps
+
+TOLERANCE = 1e-10
+SIZE = 200
+
+
+def changing_sets(random: np.random.Generator) -> Iterator[np.ndarray]:
+    """From none closed to all, and sets of which few contacts change, some back again."""
+    yield from (np.zeros(SIZE, dtype=bool), np.ones(SIZE, dtype=bool))
+    C = random.random(SIZE) < 0.6
+    for _ in range(12):
+        yield C
+        some = random.integers(0, SIZE, 5)
+        yield C ^ np.isin(np.arange(SIZE), some)
+        C = C ^ np.isin(np.arange(SIZE), random.integers(0, SIZE, 7))
+
+
+def test_a_factor_follows_the_contact_set() -> None:
+    """Against a solution of Q_CC alone; the border serves most of the sets."""
+    Q, random = definite(SIZE, 0), np.random.default_rng(1)
+    factor, factored = ClosedFactor(Q), 0
+    for C in changing_sets(random):
+        b, rows, base = random.standard_normal(SIZE), np.flatnonzero(C), factor.B
+        u = factor.solve(C, b)
+        factored += factor.B is not base
+        assert not u[~C].any()
+        np.testing.assert_allclose(
+            u[rows], np.linalg.solve(Q[np.ix_(rows, rows)], b[rows]), rtol=1e-9, atol=1e-9
+        )
+    assert 3 <= factored <= 13
+
+
+def test_a_set_starts_from_any_point() -> None:
+    """λ is zero off the set and y on it, and y = Qλ − p, wherever λ was."""
+    Q, random = definite(SIZE, 2), np.random.default_rng(3)
+    sets, p = ClosedSets(Q), random.standard_normal(SIZE)
+    for C in changing_sets(random):
+        lam = random.uniform(0, 1, SIZE) * (random.random(SIZE) < 0.5)
+        trial = sets.set(TrialSolution(lam, Q @ lam - p, 0.0), C)
+        assert not trial.lam[~C].any()
+        assert not trial.y[C].any()
+        np.testing.assert_allclose(trial.y, Q @ trial.lam - p, atol=1e-9)
+
+
+@pytest.mark.parametrize("mean", [-3.0, -1.0, 0.0, 1.0, 3.0])
+@pytest.mark.parametrize("size", [40, 300])
+def test_where_q_does_not_decay_answers_are_exact_from_few_to_all_closed(size: int, mean: float) -> None:
+    """Alone, from another case, and several together; y on the contacts that NNLS closes is zero."""
+    Q, random = definite(size, 5, 1e3), np.random.default_rng(size)
+    level = Q @ np.full(size, mean)
+    sweeps = Sweeps(dual_alone(Q))
+    assert sweeps.M is None
+    loads = [DualLoadCase(0 * p, -p, p) for p in level + 30 * random.standard_normal((4, size))]
+    first = sweeps.solved(loads[0], TOLERANCE)
+    alone = [sweeps.answer(sweeps.solved(load, TOLERANCE), TOLERANCE) for load in loads]
+    together = [sweeps.answer(case, TOLERANCE) for case in sweeps.together(loads, TOLERANCE)]
+    warm = [
+        sweeps.answer(case, TOLERANCE) for case in sweeps.together(loads, TOLERANCE, [first] * len(loads))
+    ]
+    for load, *answers in zip(loads, alone, together, warm, strict=True):
+        wanted = by_nnls(Q, load.p)
+        for answer in answers:
+            assert answer.status == "solved"
+            assert answer.details["closed"] == (wanted > 0).sum()
+            np.testing.assert_allclose(answer.lam, wanted, atol=1e-9 * max(1.0, wanted.max()))
+
+
+def test_an_answer_does_not_depend_on_those_before() -> None:
+    """To the last bit: the factor of another load case is not taken over."""
+    Q, random = definite(SIZE, 6, 1e3), np.random.default_rng(7)
+    loads = [DualLoadCase(0 * p, -p, p) for p in 10 + 30 * random.standard_normal((3, SIZE))]
+    sweeps = Sweeps(dual_alone(Q))
+    for load in loads:
+        sweeps.solved(load, TOLERANCE)
+    again = sweeps.solved(loads[0], TOLERANCE).trial.lam
+    np.testing.assert_array_equal(again, Sweeps(dual_alone(Q)).solved(loads[0], TOLERANCE).trial.lam)
