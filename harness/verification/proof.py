@@ -21,8 +21,9 @@ matter where λ came from. Refinement of x and λ_C in twice the working precisi
 
     x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
 
-by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M (closed_contacts.py). Load
-cases are columns; a column is taken out when its bound is small enough.
+by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M (closed_contacts.py), or
+with springs at the contacts of C where K is sparse and there is no M (sprung_contacts.py). Load cases
+are columns; a column is taken out when its bound is small enough.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -42,6 +43,7 @@ from problems.storage import fingerprint
 from .balanced_units import Balanced
 from .closed_contacts import ClosedContacts, ScaledInverse
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
+from .sprung_contacts import Springs, SprungContacts
 
 MAX_PASSES = 30
 MAX_WORSE = 2  # passes in a row that do not halve the bound
@@ -87,6 +89,12 @@ class Proof:
     def inverse(self) -> ScaledInverse:
         """M ≈ Q⁻¹, made when an answer is first refined."""
         return ScaledInverse.of(self.balanced.prepared, self.balanced.R[:, 0])
+
+    @cached_property
+    def springs(self) -> Springs | None:
+        """K with springs, where K is sparse and there is no M."""
+        sprung = self.inverse.M is None and not self.balanced.assembly.K.dense
+        return Springs(self.balanced, self.kappa) if sprung else None
 
     @cached_property
     def compliance(self) -> float:
@@ -204,29 +212,59 @@ class Proof:
 
         r (n, k), s (m, k), λ (m, k) : those of the answers. enough_mm : a displacement that does not count.
         """
-        units = self.balanced
+        units, At = self.balanced, self.balanced.At
         dx = units.solve(r)
-        y = s - units.At @ dx
+        y = s - At @ dx
+        target = np.full(y.shape[1], enough_mm / 2 / self.spread if enough_mm else 0.0)
+        if self.springs is not None:
+            columns = [self._by_springs(*column) for column in zip(y.T, lam.T, target, strict=True)]
+            more, dlam = (np.column_stack(both) for both in zip(*columns, strict=True))
+            return dx + more, dlam
         starts = [ClosedContacts(self.inverse, *columns) for columns in zip(y.T, lam.T, strict=True)]
         C = np.column_stack([start.C for start in starts])
         dlam = np.column_stack([start.dlam for start in starts])
-        w = units.solve(units.A @ dlam)
-        dx -= w
-        missed = np.where(C, -(y + units.At @ w), 0.0)
-        target = REDUCTION * length(np.where(C, y, 0.0))
-        if enough_mm:
-            target = np.maximum(target, enough_mm / 2 / self.spread)
+
+        def precondition(v: Matrix) -> Matrix:
+            pairs = zip(starts, v.T, strict=True)
+            return np.column_stack([start.precondition(column) for start, column in pairs])
+
+        more, dlam = self._closed(y, C, dlam, target, units.solve, precondition)
+        return dx + more, dlam
+
+    def _by_springs(self, y: Vector, lam: Vector, target: Vector) -> tuple[Matrix, Matrix]:
+        """As `_closed`, for one column, with K and springs at the closed contacts in place of K and M."""
+        assert self.springs is not None
+        Q_lam = self.balanced.At @ self.balanced.solve(self.balanced.A @ lam[:, None])[:, 0]
+        typical = float(lam @ Q_lam) / (float(lam @ lam) or 1.0)
+        start = SprungContacts(self.springs, y, lam, np.maximum(self.inverse.diagonal, typical))
+        one = y[:, None], start.C[:, None], start.dlam[:, None], target[None]
+        return self._closed(*one, start.solve, lambda v: v, start.rho)
+
+    def _closed(
+        self,
+        y: Matrix,
+        C: Mask,
+        dlam: Matrix,
+        target: Vector,
+        solve: Callable[[Matrix], Matrix],
+        precondition: Callable[[Matrix], Matrix],
+        rho: float = 0.0,
+    ) -> tuple[Matrix, Matrix]:
+        """dx and dλ by conjugate gradients, from a first dλ; solve : b → (K + ρA_C A_Cᵀ)⁻¹b."""
+        A, At, closing = self.balanced.A, self.balanced.At, np.where(C, y, 0.0)
+        dx = -solve(A @ (dlam - rho * closing))
+        missed = np.where(C, At @ dx - y, 0.0)
+        target = np.maximum(target, REDUCTION * length(closing))
         direction, previous = np.zeros_like(missed), np.ones(missed.shape[1])
         for _ in range(MAX_PRODUCTS):
             going = length(missed) > target
             if not going.any():
                 break
-            columns = zip(starts, missed.T, strict=True)
-            z = np.where(going, np.column_stack([start.precondition(v) for start, v in columns]), 0.0)
+            z = np.where(going, precondition(missed), 0.0)
             product = (missed * z).sum(axis=0)
             direction = z + np.where(product > 0, product / previous, 0.0) * direction
-            w = units.solve(units.A @ direction)
-            q = np.where(C, units.At @ w, 0.0)
+            w = solve(A @ direction)
+            q = np.where(C, At @ w, 0.0)
             energy = (direction * q).sum(axis=0)
             step = np.where(going & (energy > 0), product / energy, 0.0)
             dlam, dx, missed = dlam + step * direction, dx - step * w, missed - step * q

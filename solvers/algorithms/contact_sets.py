@@ -25,13 +25,11 @@ In both ways, ever stiffer springs find a first set.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
-from problems.stiffness.block import SparseBlock
-from problems.stiffness.sparse_block import sparse_block
+from problems.forms.sprung_stiffness import SprungStiffness
 from solvers.base import DualLoadCase
 
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
@@ -98,22 +96,16 @@ def yielding_set(M: BandedInverse, compliance: Vector, start: TrialSolution) -> 
 class ContactSprings:
     """Factorisations of K with springs at closed contacts, in place of Q⁻¹; vectors in the order of A.
 
-    K : one matrix. order : K with springs at all contacts; its numbering serves any set. stiffest : the
-    largest stiffness of an unknown at a contact, N/mm. rho : the stiffness of the springs, N/mm.
+    stiffest : the largest stiffness of an unknown at a contact, N/mm. rho : that of the springs, N/mm.
     """
 
     def __init__(self, prepared: Prepared) -> None:
         assembly = prepared.assembly
-        self.compliance, self.A, self.K = prepared.compliance, assembly.A, assembly.K.matrix
-        self.order = sparse_block(sp.csc_array(self.K + self.A @ self.A.T), assembly.nodes)
+        self.compliance, self.A = prepared.compliance, assembly.A
+        self.sprung = SprungStiffness(assembly.K.matrix, self.A, assembly.nodes)
         stiffest = float(assembly.K.diagonal[self.A.indices].max(initial=0.0))
         self.stiffest = stiffest / ((self.A.data**2).max(initial=0.0) or 1.0)
         self.rho = self.stiffest * max(STIFFER, KEPT / prepared.condition)
-
-    def block(self, rho: float, C: Mask) -> SparseBlock:
-        """K + ρ A_C A_Cᵀ."""
-        A_C = self.A[:, np.flatnonzero(C)]
-        return self.order.replaced(sp.csc_array(self.K + rho * (A_C @ A_C.T)))
 
     def begin(self) -> None:
         """Every set is factored anew."""
@@ -121,7 +113,7 @@ class ContactSprings:
     def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
         """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
         A, lam, y, rho = self.A, start.lam, start.y, self.rho
-        K, change = self.block(rho, C), np.zeros_like(lam)
+        K, change = self.sprung.block(np.where(C, rho, 0.0)), np.zeros_like(lam)
         for _ in range(PASSES):
             closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))
             change = np.where(C, change + rho * (closed - y), -lam)
@@ -138,6 +130,6 @@ class ContactSprings:
             return C
         rho = float(overlap @ overlap / (overlap @ (self.compliance @ overlap)))
         while rho < self.stiffest and C.any():
-            x = self.block(rho, C).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
+            x = self.sprung.block(np.where(C, rho, 0.0)).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
             C, rho = A.T @ x > load.g, GROWTH * rho
         return C

@@ -15,6 +15,7 @@ from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Matrix
+from problems.forms.sprung_stiffness import SprungStiffness
 from problems.scene_files import read_scene
 from problems.stiffness import band_factor
 from problems.stiffness.band_factor import factor_norm, half_bandwidth, lower_band
@@ -206,3 +207,15 @@ def test_a_scene_with_a_mechanism_is_bad_input_that_says_where_it_moves(
         allowed.append(fault.allowed)
     assert set(allowed) == {allowed[0]}
     assert re.fullmatch(r"x\[6[0-3]\]" + (r" at \(6[0-3], 0\) mm" if with_nodes else ""), fault.key)
+
+
+@pytest.mark.parametrize("n", [8, 60])
+def test_springs_of_any_stiffness_share_a_numbering(n: int) -> None:
+    """Also where springs of stiffness 1 cancel entries of K."""
+    random = np.random.default_rng(n)
+    K = sp.csc_array(2 * np.eye(n) + np.eye(n)[::-1])
+    A = sp.csc_array(np.eye(n, n // 2) - np.eye(n)[::-1][:, : n // 2])
+    sprung = SprungStiffness(K, A, None)
+    for rho in (np.ones(n // 2), 7.0 * (random.random(n // 2) < 0.5)):
+        full = K.toarray() + (A.toarray() * rho) @ A.toarray().T
+        close(sprung.block(rho).solve(np.eye(n)), np.linalg.inv(full))
