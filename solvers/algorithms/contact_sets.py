@@ -19,7 +19,7 @@ Appl. 4:303–320, 1969),
 
 Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; the next product with Q corrects the rest.
 
-In both ways, ever stiffer springs find a first set.
+In both ways, ever stiffer springs find a first set; where that creeps, an interior point (interior_set.py).
 """
 
 from dataclasses import dataclass
@@ -28,14 +28,16 @@ import numpy as np
 
 from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
+from problems.forms.compliance import ComplianceProducts
 from problems.forms.prepared import Prepared
 from problems.forms.sprung_stiffness import SprungStiffness
 from solvers.base import DualLoadCase
 
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
+from .interior_set import interior_set
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact, or more where K is well conditioned
-KEPT = 2.0**26  # ρ in these units times cond(K): the springs keep half of the digits of K
+KEPT = 2.0**40  # ρ in these units times cond(K): the springs keep the last twelve bits of K
 PASSES = 2
 GROWTH = 4.0  # of ρ per step; with twice as much the edge lags, and pivoting then needs more sets
 
@@ -101,7 +103,8 @@ class ContactSprings:
 
     def __init__(self, prepared: Prepared) -> None:
         assembly = prepared.assembly
-        self.compliance, self.A = prepared.compliance, assembly.A
+        self.compliance, self.A = ComplianceProducts(assembly.K, assembly.A), assembly.A
+        self.diagonal = prepared.approximate_inverse.diagonal
         self.sprung = SprungStiffness(assembly.K.matrix, self.A, assembly.nodes)
         stiffest = float(assembly.K.diagonal[self.A.indices].max(initial=0.0))
         self.stiffest = stiffest / ((self.A.data**2).max(initial=0.0) or 1.0)
@@ -133,3 +136,9 @@ class ContactSprings:
             x = self.sprung.block(np.where(C, rho, 0.0)).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
             C, rho = A.T @ x > load.g, GROWTH * rho
         return C
+
+    def interior_set(self, load: DualLoadCase) -> tuple[Mask, int]:
+        """The closed contacts of an interior point, (m,), and the factorisations that it took."""
+        if not (load.p > 0).any():
+            return load.p > 0, 0
+        return interior_set(self.compliance, self.sprung, self.diagonal, load.p, self.rho)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.compliance import Compliance
 from problems.forms.prepared import Prepared
 from problems.stiffness.dense_block import product
 
@@ -63,7 +64,7 @@ class NewtonSteps:
     theta : fraction of the step to the boundary, in (0, 1).
     """
 
-    Q: Matrix
+    Q: Compliance
     p: Vector
     system: NewtonSystem
     theta: float
@@ -73,7 +74,7 @@ class NewtonSteps:
     unconverged: int = 0
 
     def at(self, lam: Vector, y: Vector) -> Point:
-        return Point(lam, y, product(self.Q, lam) - self.p)
+        return Point(lam, y, self.Q @ lam - self.p)
 
     def direction(self, point: Point, s3: Vector, kind: str) -> tuple[Vector, Vector]:
         """(Δλ, Δy) of Algorithm 2, step 1, where (14) reads (Q + D) Δλ = s1 + Λ⁻¹s3 with D = YΛ⁻¹."""

@@ -19,7 +19,8 @@ Qw = δp + δg takes no product, and α = 1 leaves x as it was. The sweeps corre
 α in [0, 1] minimises ½λᵀQλ − pᵀλ.
 
 An edge of contact creeps by about a row of contacts per set. If the first sets creep, the set of yielding
-contacts (`contact_sets.yielding_set`), whose edges move further, replaces them. Far from the solution a
+contacts (`contact_sets.yielding_set`), whose edges move further, or that of an interior point
+(`interior_set`) where there is no banded M, replaces them. Far from the solution a
 product corrects more than further sets, so the limit on the sets of a sweep grows from sweep to sweep.
 """
 
@@ -99,6 +100,11 @@ class Sweeps:
         """The replacement of M where there is none."""
         if self.prepared.assembly.K.dense:
             return ClosedSets(self.prepared.Q, self.prepared.assembly.contact_nodes)
+        return self.springs
+
+    @cached_property
+    def springs(self) -> ContactSprings:
+        """Factorisations of a sparse K."""
         return ContactSprings(self.prepared)
 
     def __call__(self, loads: Sequence[DualLoadCase], tolerance: float) -> list[Answer]:
@@ -221,12 +227,18 @@ class Sweeps:
         else:
             case.factor = case.factor or OpenFactor(self.M)
             at = partial(banded_set, case.factor, case.trial)
-        floor = largest_rounding(self.compliance, case.load.p[self.order], case.trial.lam)
-        most, begins = int(FIRST_SETS * GROWTH**case.sweeps), self.M if case.sweeps == 0 else None
+        order = self.order
+        floor = largest_rounding(self.compliance, case.load.p[order], case.trial.lam)
+        most, dense = int(FIRST_SETS * GROWTH**case.sweeps), self.prepared.assembly.K.dense
+        begins = case.sweeps == 0 and not (dense and self.M is None)
         result = block_pivoting(at, case.C, self.compliance, floor, most, PATIENCE if begins else None)
         if begins and result.creeps:
-            case.sets += result.passes
-            C = yielding_set(begins, self.compliance, case.trial)
+            if self.M is None or (len(self.M.band) > len(order) and not dense):  # M is Q⁻¹, and no band
+                C, factorisations = self.springs.interior_set(case.load)
+                C = C[order]
+            else:
+                C, factorisations = yielding_set(self.M, self.compliance, case.trial), 0
+            case.sets += result.passes + factorisations
             result = block_pivoting(at, C, self.compliance, floor, PATIENCE)
         unchanged = not (case.C ^ result.C).any()
         case.C, case.sets = result.C, case.sets + result.passes

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from problems.forms.compliance import DenseCompliance
 from solvers.algorithms.interior_point import (
     SCHEMES,
     CgExhausted,
@@ -110,7 +111,7 @@ class Ipm(Method):
         Q, system = ready.Q, ready.system
         tolerance /= load.energy**0.5
         system.begin()
-        newton = NewtonSteps(Q, load.p, system, THETA, self.cg_tolerance, self.max_cg)
+        newton = NewtonSteps(DenseCompliance(Q), load.p, system, THETA, self.cg_tolerance, self.max_cg)
         details: dict[str, Any] = {"cg": newton.counts}
         start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
         first = newton.at(start.lam, start.y)  # step 3
@@ -174,8 +175,8 @@ class Ipm(Method):
     @np.errstate(over="ignore")
     def _measure(self, newton: NewtonSteps, point: Point, tolerance: float) -> float:
         """The largest ratio of a quantity of the stopping rule to what it may be."""
-        force, y = np.diag(newton.Q) * point.lam, point.y
-        rounding = largest_rounding(np.diag(newton.Q), newton.p, point.lam)
+        force, y = np.diag(newton.system.Q) * point.lam, point.y
+        rounding = largest_rounding(np.diag(newton.system.Q), newton.p, point.lam)
         undecided = float(np.minimum(y, force).max())
         spread = float(np.sqrt((force * y).mean()))
         return max(

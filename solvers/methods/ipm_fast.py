@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from problems.forms.compliance import DenseCompliance
 from solvers.algorithms.interior_point import NewtonSteps, mehrotra, stp2
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.algorithms.newton_system import Banded, Direct, NewtonSystem
@@ -52,7 +53,7 @@ class FastIpm(Method):
         Q, p, system = ready.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()
-        newton = NewtonSteps(Q, p, system, THETA, REFINEMENT, np.inf)
+        newton = NewtonSteps(DenseCompliance(Q), p, system, THETA, REFINEMENT, np.inf)
         start = stp2(Q, p, RHO, LEAST_GAP)
         point = newton.at(start.lam, start.y)
         details: dict[str, Any] = {"start": {"mu": point.mu}}

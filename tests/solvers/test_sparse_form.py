@@ -88,6 +88,29 @@ def test_without_m_the_sets_are_solved_by_factorisations_of_k(
     check(session_of("newton", data).next(load, None), dense, load)
 
 
+@pytest.mark.parametrize("few", [True, False])
+def test_an_edge_of_contact_does_not_creep(few: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Convex regression: pivoting alone takes hundreds of sets, an interior point some thirty factors."""
+    if not few:
+        monkeypatch.setattr(compliance, "FEW", -1)
+    n, random = 1000, np.random.default_rng(0)
+    A = sp.csc_array(sp.diags_array([-1.0, 2.0, -1.0], offsets=[0, -1, -2], shape=(n, n - 2)))
+    f = np.sin(np.arange(n) / 300) + 0.1 * random.standard_normal(n)
+    data, load = (
+        Prepared(Assembly(Stiffness.of(sp.eye_array(n, format="csc")), A)),
+        LoadCase(f, np.zeros(n - 2)),
+    )
+    answer = session_of("newton", data).next(load, None)
+    assert answer.status == "solved"
+    assert answer.inner_iterations is not None
+    assert answer.inner_iterations <= 60
+    x, lam = np.asarray(answer.x), np.asarray(answer.lam)
+    assert (A.T @ x).max() <= 1e-9  # convex
+    assert lam.min() >= 0
+    assert abs(lam @ (A.T @ x)) <= 1e-6
+    assert abs(x + A @ lam - f).max() <= 1e-6
+
+
 @pytest.mark.parametrize("with_nodes", [False, True])
 @pytest.mark.parametrize("band", [True, False])
 def test_a_users_own_sparse_matrices(band: bool, with_nodes: bool, tmp_path: Path) -> None:

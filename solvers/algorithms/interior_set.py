@@ -1,0 +1,78 @@
+"""A first contact set by interior-point steps, for sparse K without a banded M ≈ Q⁻¹.
+
+Contact sets see an edge of contact, which creeps by about a row of contacts per set; interior points see all
+contacts at once. Mehrotra's steps (interior_point.py) have systems (Q + D) v = b, D = YΛ⁻¹, which K with
+springs D⁻¹ at all contacts solves (Sherman, Morrison and Woodbury), in one numbering for all D:
+
+    v = D⁻¹ (b − Aᵀ (K + A D⁻¹ Aᵀ)⁻¹ A D⁻¹ b).
+
+No spring is stiffer than ρ, which leaves K its last digits; conjugate gradients correct both.
+
+The start is the paper's idea, forces that open every gap (Algorithm 5), without its loop: with all contacts
+glued by springs ρ, (Q + I/ρ) λ = p, and v the largest overlap max p,
+
+    λ_i = max(|λ_i|, v/q_ii),        y_i = max(−p_i, 0) + v.
+"""
+
+import numpy as np
+
+from problems.forms.assembly import Mask, Vector
+from problems.forms.compliance import ComplianceProducts
+from problems.forms.sprung_stiffness import SprungStiffness
+
+from .interior_point import NewtonSteps, mehrotra
+from .newton_system import NewtonSystem, Solved, conjugate_gradients
+
+THETA = 0.995
+REFINEMENT, PRODUCTS = 1e-3, 20  # of a system, and its conjugate gradients at most
+MAX_STEPS = 60
+SMALLEST = 1e-13  # of the first μ: below, what is undecided remains so
+
+
+class Sprung(NewtonSystem):
+    """Conjugate gradients preconditioned by K with springs. rho : the stiffest, N/mm."""
+
+    def __init__(self, compliance: ComplianceProducts, sprung: SprungStiffness, rho: float) -> None:
+        self.compliance, self.sprung, self.rho = compliance, sprung, rho
+        self.begin()
+
+    def begin(self) -> None:
+        self.D, self.factorisations = np.full(self.sprung.A.shape[1], np.nan), 0
+
+    def update(self, D: Vector) -> int:
+        self.springs = 1 / (D + 1 / self.rho)
+        self.K = self.sprung.block(self.springs)
+        return 1
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        self.take(D)
+        return conjugate_gradients(self.times_H, b, tolerance, min(limit, PRODUCTS), self.near)
+
+    def near(self, b: Vector) -> Vector:
+        """About (Q + D)⁻¹ b."""
+        A, rho = self.sprung.A, self.springs
+        return rho * (b - A.T @ self.K.solve(A @ (rho * b)))
+
+    def times_H(self, v: Vector) -> Vector:
+        return self.compliance @ v + self.D * v
+
+
+def interior_set(
+    Q: ComplianceProducts, sprung: SprungStiffness, compliance: Vector, p: Vector, rho: float
+) -> tuple[Mask, int]:
+    """The closed contacts of an interior point, (m,), and the factorisations that it took.
+
+    It ends with μ = λᵀy/m at 1e-13 of its first value. Closed is a contact whose λ falls less in the last
+    step than its y, λ⁺/λ > y⁺/y (Tapia's indicators, which have no unit). p (m,) mm : the overlap without
+    contact. compliance : about diag(Q).
+    """
+    system, overlap = Sprung(Q, sprung, rho), float(p.max(initial=0.0))
+    newton = NewtonSteps(Q, p, system, THETA, REFINEMENT, np.inf)
+    system.take(np.zeros(len(p)))
+    point = newton.at(np.maximum(abs(system.near(p)), overlap / compliance), np.maximum(-p, 0.0) + overlap)
+    last, enough = point, SMALLEST * point.mu
+    for _ in range(MAX_STEPS):
+        if point.mu <= enough:
+            break
+        last, point = point, mehrotra(newton, point)
+    return point.lam / last.lam > point.y / last.y, system.factorisations
