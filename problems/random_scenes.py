@@ -1,12 +1,16 @@
 """Scenes drawn at random, `drawn/<n>/<k>` with k from 0 to 99 999, on the assemblies wing-fragment-<n>.
 
-The SHA-256 of "<version>/<n>/<k>" is eight integers u < 2³². Each draws one integer from low to high, as
-low + ⌊u (high − low + 1) / 2³²⌋. So the scenes of a version are the same on every machine, and the next
-version has others: nobody can have tuned on them.
+The SHA-256 of "<version>/<n>/<k>" is eight integers u < 2³², and so is that of "<version>/<n>/<k>/1", and so
+on. Each draws one integer from low to high, as low + ⌊u (high − low + 1) / 2³²⌋. So the scenes of a version
+are the same on every machine, and the next version has others: nobody can have tuned on them.
+
+`drawn/superelements/<k>` are joints of superelements (`problems/random_superelements.py`).
 """
 
+import itertools
 import re
 import struct
+from collections.abc import Callable, Iterator
 from hashlib import sha256
 from typing import Any
 
@@ -16,8 +20,10 @@ SIZES = (4386, 6112, 11308)
 MEANS = (0.3, 0.6, 1.0)  # mm, of the gap
 ROWS = (1, 2, 4)  # of fasteners
 EDGE = 25.0  # mm, from the outermost fasteners to the border
-EXAMPLES = [f"drawn/{n}/0" for n in SIZES]
-NAME = re.compile(rf"(drawn/({'|'.join(map(str, SIZES))})/)(0|[1-9][0-9]{{0,4}})")
+SUPERELEMENTS = "superelements"
+KINDS = (*map(str, SIZES), SUPERELEMENTS)
+EXAMPLES = [f"drawn/{kind}/0" for kind in KINDS]
+NAME = re.compile(rf"(drawn/({'|'.join(KINDS)})/)(0|[1-9][0-9]{{0,4}})")
 RANGE = re.compile(rf"{NAME.pattern}\.\.([0-9]{{1,5}})")
 
 
@@ -31,26 +37,41 @@ def drawn_names(pattern: str) -> list[str]:
     return [f"{folder}{k}" for k in range(int(first), int(last) + 1)]
 
 
+#: Draws an integer from low to high.
+Draw = Callable[[int, int], int]
+
+
+def draw_of(name: str) -> Draw:
+    """The draws of a scene, one after another."""
+
+    def integers() -> Iterator[int]:
+        text = f"{__version__}/{name.removeprefix('drawn/')}"
+        for k in itertools.count():
+            yield from struct.unpack(">8I", sha256((f"{text}/{k}" if k else text).encode()).digest())
+
+    numbers = integers()
+    return lambda low, high: low + (next(numbers) * (high - low + 1) >> 32)
+
+
+def power_of_ten(draw: Draw, low: int, high: int) -> float:
+    """10^(low/1000) … 10^(high/1000), uniform in the logarithm; four digits, so that no rounding can show."""
+    return float(f"{10 ** (draw(low, high) / 1000):.3e}")
+
+
 def drawn_table(name: str) -> dict[str, Any] | None:
-    """The content of a drawn scene's file; None if the name is not that of a drawn scene.
+    """The content of a drawn scene's file; None if the name is not that of a drawn scene with a file.
 
     Gap: mean 0.3, 0.6 or 1 mm, standard deviation 0.02 … 0.2 mm, correlation length 80 … 600 mm. Fasteners:
-    4 … 32 columns, 1, 2 or 4 rows, 500 … 4000 N each. Pressure on both parts: 10^−6 … 10^−2.2 MPa, uniform in
-    its logarithm, to four digits, so that no rounding of 10^x can show.
+    4 … 32 columns, 1, 2 or 4 rows, 500 … 4000 N each. Pressure on both parts: 10^−6 … 10^−2.2 MPa.
     """
-    if not (found := NAME.fullmatch(name)):
+    if not (found := NAME.fullmatch(name)) or (n := found[2]) == SUPERELEMENTS:
         return None
-    n, k = found.group(2, 3)
-    draws = iter(struct.unpack(">8I", sha256(f"{__version__}/{n}/{k}".encode()).digest()))
-
-    def draw(low: int, high: int) -> int:
-        return low + (next(draws) * (high - low + 1) >> 32)
-
+    draw = draw_of(name)
     mean = MEANS[draw(0, len(MEANS) - 1)]
     sd, length, seed = draw(20, 200) / 1000, draw(80, 600), draw(0, 2**32 - 1)
     columns, rows = draw(4, 32), ROWS[draw(0, len(ROWS) - 1)]
     preload = draw(500, 4000)
-    pressure = float(f"{10 ** (draw(-6000, -2200) / 1000):.3e}")
+    pressure = power_of_ten(draw, -6000, -2200)
     gap = f"gap {mean:g} mm (sd {sd:g}, correlation length {length})"
     random = {"sd": sd, "correlation_length": length, "seed": seed}
     pattern = {"columns": columns, "rows": rows, "edge": EDGE}

@@ -30,7 +30,7 @@ from problems.model.effect_tables import EffectTable
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MatricesScene, Scene
-from problems.random_scenes import EXAMPLES, drawn_table
+from problems.random_scenes import EXAMPLES, drawn_names, drawn_table
 
 from .errors import BACKSLASH, Fault, InputError
 
@@ -59,6 +59,10 @@ def read_scene(name_or_path: str) -> Scene:
         return make_rung(name_or_path)
     if table := drawn_table(name_or_path):
         return _scene(name_or_path, SCENES / name_or_path, table)
+    if drawn_names(name_or_path) == [name_or_path]:
+        from problems.random_superelements import drawn_joint
+
+        return drawn_joint(name_or_path)
     path = Path(name_or_path)
     if path.suffix == ".npz":
         if not path.is_file():

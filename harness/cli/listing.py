@@ -6,7 +6,7 @@ from harness.planning.suite import read_suite, suite_names
 from problems import formats
 from problems.errors import InputError
 from problems.ladders import PREFIXES, rung_names
-from problems.random_scenes import SIZES
+from problems.random_scenes import KINDS
 from problems.scene_files import read_scene, scene_names
 from solvers.registry import make_solver, modules, solver_names, solver_version
 
@@ -28,8 +28,8 @@ def _solvers() -> Table:
 
 
 def _scenes() -> Table:
-    sizes = " or ".join(map(str, SIZES))
-    caption = f"Not listed: scenes drawn at random, drawn/<n>/<k>, with n = {sizes} and k = 0, 1, 2, …"
+    folders = ", ".join(f"drawn/{kind}/<k>" for kind in KINDS)
+    caption = f"Not listed: scenes drawn at random, {folders}, with k = 0, 1, 2, …"
     table = Table("scene", "n", "m", "title", caption=caption)
     rungs = [name for prefix in PREFIXES for name in rung_names(prefix)]
     for name in [*scene_names(), *rungs]:

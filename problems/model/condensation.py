@@ -117,16 +117,26 @@ def condensed_stiffness(key: str, part: PartModel, reporter: Reporter, name: str
     """
 
     def made() -> storage.Entry:
-        start, keep, lines = time.perf_counter(), np.zeros(part.plate.size, dtype=bool), lines_across(part)
-        keep[part.deflections] = True
-        S = condense(part.stiffness(), lines, keep, reporter, name)
-        kept = np.concatenate(lines)
-        order = np.argsort(kept[keep[kept]])
-        K = S.T.take(order, axis=0).take(order, axis=1).T  # by columns, and symmetric to the last bit
+        start = time.perf_counter()
+        K = condensed_onto(part.deflections, part, reporter, name)
         return {"K": K}, {"seconds": time.perf_counter() - start}
 
     arrays, facts = storage.load_or_make(key, made)
     return arrays["K"], facts["seconds"]
+
+
+def condensed_onto(kept: Indices, part: PartModel, reporter: Reporter = SILENT, name: str = "") -> Matrix:
+    """The part's stiffness on the unknowns `kept` (k,) of its plate, in their order: (k, k) by columns.
+
+    Symmetric to the last bit. Raises NotPositiveDefinite as `condense` does.
+    """
+    keep, lines = np.zeros(part.plate.size, dtype=bool), lines_across(part)
+    keep[kept] = True
+    S = condense(part.stiffness(), lines, keep, reporter, name)
+    ordered = np.concatenate(lines)
+    place = np.empty(part.plate.size, dtype=np.intp)
+    place[ordered[keep[ordered]]] = np.arange(len(S))
+    return S.T.take(place[kept], axis=0).take(place[kept], axis=1).T
 
 
 def condensed_load(

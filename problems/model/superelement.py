@@ -11,7 +11,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import scipy.linalg as sla
@@ -61,19 +61,65 @@ class SuperelementTable(Table):
         return dofs
 
 
+class StiffnessSource(Protocol):
+    """The origin of a part's K: a file, or a plate that is condensed here."""
+
+    @property
+    def key(self) -> str:
+        """The hash of what determines K, and of the code that makes it."""
+
+    def stored(self) -> storage.Entry:
+        """K and facts on it, from the cache or made now. Raises InputError."""
+
+
+@dataclass(frozen=True)
+class StiffnessFile:
+    """K of a file. content : the hash of its bytes. matrix : the name of K in a file with several."""
+
+    path: Path
+    content: str
+    matrix: str | None
+
+    @property
+    def key(self) -> str:
+        code = fingerprint([Path(__file__)], within=("problems/formats", "problems/input"))
+        return storage.digest("superelement", self.content, self.matrix, code)
+
+    def stored(self) -> storage.Entry:
+        """K, checked, and the labels of its rows if the file has any."""
+        return storage.load_or_make(self.key, self._read)
+
+    def _read(self) -> storage.Entry:
+        path = self.path
+        as_read, labels, unread = read_stiffness(path, self.matrix)
+        n = as_read.shape[0]
+        nothing = {"A": sp.csc_array((n, 0)), "f": np.zeros(n), "g": np.zeros(0)}
+        sparse = sp.issparse(as_read) and n > SMALL and as_read.nnz <= DENSEST * n**2
+        assembly, _ = checked({"K": as_read} | nothing, dict.fromkeys("KAfg", str(path)), sparse=True)
+        if _hash(path) != self.content:
+            raise InputError.one(path, "superelement", "changed", UNCHANGED)
+        K, notes = assembly.K.matrix, list(assembly.notes)
+        if unread:
+            notes.append(f"Not read of {path.name}: {', '.join(unread)}")
+        arrays = matrix_files.packed({"K": K if sparse else K.toarray(order="F")})
+        if labels is not None:
+            arrays["labels"] = labels
+        return arrays, {"notes": notes, "sparse": bool(sparse)}
+
+
 @dataclass(frozen=True, eq=False)
 class Superelement:
     """A part with its nodes and the meaning of its unknowns.
 
+    file : that of K, or the scene, for messages. content : a hash of its data, without that of code.
+    dofs : the degrees of freedom of each node, for a K without labels.
     node, dof (n,) : the node, an index into `nodes`, and the degree of freedom of each unknown.
-    content : a hash of its files' content. source : the hash of K's file alone, and the name of its matrix.
-    dofs : the degrees of freedom of each node, for a file without labels.
     """
 
     name: str
     file: Path
     content: str
-    source: tuple[str, str | None]
+    source: StiffnessSource
     dofs: tuple[int, ...]
     nodes: Nodes
     node: Indices
@@ -88,15 +134,15 @@ class Superelement:
         except InputError as error:
             faults += error.faults
         try:
-            source = _hash(path), table.matrix
-            entry = stored(path, *source)
+            source = StiffnessFile(path, _hash(path), table.matrix)
+            entry = source.stored()
         except InputError as error:
             faults += error.faults
         if nodes is None or entry is None:
             raise InputError(faults)
         node, dof = rows_of(path, folder / table.nodes, nodes, entry[0], table.dofs, table.rows)
         content = [array.tolist() for array in (nodes.xyz, nodes.normal, nodes.contact, node, dof)]
-        dofs, key = table.dofs or NORMAL_ALONE, storage.digest(source, content)
+        dofs, key = table.dofs or NORMAL_ALONE, storage.digest((source.content, source.matrix), content)
         part = cls(table.name, path, key, source, dofs, nodes, node, dof)
         if (lost := part._lost).size:
             where = f"{len(lost)} nodes of the contact surface, ids {listed(map(str, nodes.ids[lost]))}"
@@ -106,8 +152,8 @@ class Superelement:
 
     @property
     def key(self) -> str:
-        """The hash of its files' content and of the code that reads them."""
-        return storage.digest(stored_key(*self.source), self.content)
+        """The hash of its data and of the code that makes K of them."""
+        return storage.digest(self.source.key, self.content)
 
     @property
     def size(self) -> int:
@@ -116,17 +162,17 @@ class Superelement:
     @property
     def stiffness(self) -> Any:
         """K (n, n): dense by columns and memory-mapped, or a csc_array."""
-        arrays, facts = stored(self.file, *self.source)
+        arrays, facts = self.source.stored()
         return matrix_files.unpacked(arrays, "K") if facts["sparse"] else arrays["K"]
 
     @property
     def notes(self) -> list[str]:
         """Sentences on what reading K has changed or left out."""
-        return [f"{self.name}: {note}" for note in stored(self.file, *self.source)[1]["notes"]]
+        return [f"{self.name}: {note}" for note in self.source.stored()[1]["notes"]]
 
     @property
     def sparse(self) -> bool:
-        return bool(stored(self.file, *self.source)[1]["sparse"])
+        return bool(self.source.stored()[1]["sparse"])
 
     @cached_property
     def contacts(self) -> Indices:
@@ -194,12 +240,6 @@ class Superelement:
         return ", ".join(word for word, one in zip(words, chosen, strict=True) if one)
 
 
-def stored_key(content: str, matrix: str | None) -> str:
-    """The key of K in the cache: its file's content, its name, and the code that reads and checks it."""
-    code = fingerprint([Path(__file__)], within=("problems/formats", "problems/input"))
-    return storage.digest("superelement", content, matrix, code)
-
-
 def _hash(path: Path) -> str:
     """The hash of a file's bytes, as two files of one size and time may differ. Raises InputError."""
     try:
@@ -207,25 +247,3 @@ def _hash(path: Path) -> str:
             return storage.digest(path.suffixes[-2:], hashlib.file_digest(file, "sha256").hexdigest())
     except OSError as error:
         raise InputError.one(path, "superelement", error.strerror, "a readable file") from error
-
-
-def stored(path: Path, content: str, matrix: str | None) -> storage.Entry:
-    """K, checked, and the labels of its rows if the file has any, from the cache. Raises InputError."""
-
-    def made() -> storage.Entry:
-        as_read, labels, unread = read_stiffness(path, matrix)
-        n = as_read.shape[0]
-        nothing = {"A": sp.csc_array((n, 0)), "f": np.zeros(n), "g": np.zeros(0)}
-        sparse = sp.issparse(as_read) and n > SMALL and as_read.nnz <= DENSEST * n**2
-        assembly, _ = checked({"K": as_read} | nothing, dict.fromkeys("KAfg", str(path)), sparse=True)
-        if _hash(path) != content:
-            raise InputError.one(path, "superelement", "changed", UNCHANGED)
-        K, notes = assembly.K.matrix, list(assembly.notes)
-        if unread:
-            notes.append(f"Not read of {path.name}: {', '.join(unread)}")
-        arrays = matrix_files.packed({"K": K if sparse else K.toarray(order="F")})
-        if labels is not None:
-            arrays["labels"] = labels
-        return arrays, {"notes": notes, "sparse": bool(sparse)}
-
-    return storage.load_or_make(stored_key(content, matrix), made)

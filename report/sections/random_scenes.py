@@ -1,10 +1,15 @@
-"""Scenes drawn at random: every solve time, worst cases beside medians, failures."""
+"""Scenes drawn at random: every solve time, worst cases beside medians, failures.
+
+Those of superelements, each of a size of its own, have a table with preparation: their seconds of all steps,
+and these relative to the fastest textbook method on the same scene.
+"""
 
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from harness.results.schema import ANSWERED, SPARSE
+from harness.results.schema import ANSWERED, DRAWN, SPARSE
 from report.analysis.standings import best_tolerances, shown
 from report.document.blocks import Block, Column, Figure, Section, Table, number, word
 from report.document.numbers import counted, power, whole
@@ -14,6 +19,7 @@ from report.results.reader import Results
 from report.results.rows import in_order
 
 PANEL = 3.0  # inches
+SUPERELEMENTS = f"{DRAWN}superelements/"
 
 
 def section(results: Results) -> Section | None:
@@ -25,13 +31,17 @@ def section(results: Results) -> Section | None:
     seconds = (cells["setup_s"].fillna(0.0) + cells["solve_s"]).where(cells["verdict"].isin(ANSWERED))
     good = (cells["status"] == "solved") & (cells["verdict"] == "within")
     cells = best_tolerances(cells.assign(load_case_s=seconds, good=good))
-    run, often = cells[cells["status"] != "not_run"], shown(cells)
+    own = cells["scene"].str.startswith(SUPERELEMENTS)
     blocks: list[Block] = []
-    if len(often):
-        blocks.append(_figure(often, ", of the methods run on at least half of the scenes"))
-    elif len(run):
-        blocks.append(_figure(run))
-    blocks.append(_times(cells, results.limit))
+    if len(sized := cells[~own]):
+        run, often = sized[sized["status"] != "not_run"], shown(sized)
+        if len(often):
+            blocks.append(_figure(often, ", of the methods run on at least half of the scenes"))
+        elif len(run):
+            blocks.append(_figure(run))
+        blocks.append(_times(sized, results.limit))
+    if own.any():
+        blocks.append(_to_textbook(cells[own], results.limit))
     if not cells["good"].all():
         blocks.append(_failures(cells[~cells["good"]]))
     return Section("Scenes drawn at random", blocks)
@@ -71,6 +81,37 @@ def _times(cells: pd.DataFrame, limit: str) -> Table:
     ]
     caption = f"*Medians and worst cases* of the answers that are reported solved and within {limit}."
     return Table("drawn", caption, pd.DataFrame(lines), columns, keys=2)
+
+
+def _to_textbook(cells: pd.DataFrame, limit: str) -> Table:
+    """A scene that a method misses counts as infinitely slow; one that the textbook misses, not at all."""
+    once = cells[["convert_s", "prepare_s"]].sum(axis=1)
+    seconds = (once + cells["load_case_s"]).where(cells["good"], np.inf)
+    textbook = seconds.where((cells["owner"] == "textbook") & cells["good"])
+    ratio = seconds / textbook.groupby(cells["scene"]).transform("min")
+    cells, lines = cells.assign(seconds=seconds, ratio=ratio).sort_values("ratio"), []
+    for method in in_order(cells, "method"):
+        mine = cells[cells["method"] == method]
+        compared = mine.dropna(subset=["ratio"])
+        line = {"method": method, "scenes": len(mine), "within": int(mine["good"].sum())}
+        line |= {"median_s": mine["seconds"].median(), "worst_s": mine["seconds"].max()}
+        line |= {"median_ratio": compared["ratio"].median(), "worst_ratio": compared["ratio"].max()}
+        lines.append(line | {"worst_scene": compared["scene"].iloc[-1] if len(compared) else ""})
+    columns = [
+        word("solver (form)", "method"),
+        number("scenes", "scenes", whole),
+        number("solved and within", "within", whole),
+        number("median, s", "median_s"),
+        number("worst, s", "worst_s"),
+        number("to textbook, median", "median_ratio"),
+        number("to textbook, worst", "worst_ratio"),
+        word("worst scene", "worst_scene"),
+    ]
+    caption = (
+        f"*Joints of superelements, preparation included*: answers that are solved and within {limit}, and "
+        "their times relative to the fastest textbook method's; –: there is an answer missing."
+    )
+    return Table("drawn-superelements", caption, pd.DataFrame(lines), columns)
 
 
 def _failures(cells: pd.DataFrame) -> Table:

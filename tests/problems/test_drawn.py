@@ -14,7 +14,7 @@ from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
 from problems.model.positions import Pattern
 from problems.model.scene import JointScene
-from problems.random_scenes import MEANS, ROWS, SIZES, drawn_names
+from problems.random_scenes import KINDS, MEANS, ROWS, SIZES, drawn_names
 from problems.scene_files import read_scene
 
 DRAWS = [f"{DRAWN}{n}/{k}" for k in range(167) for n in SIZES]  # 501
@@ -97,6 +97,6 @@ def test_a_range_stands_for_its_names() -> None:
 
 def test_the_suite_says_every_name_it_stands_for(tmp_path: Path) -> None:
     suite = read_suite("drawn")
-    assert suite.scenes == [f"drawn/{n}/{k}" for n in SIZES for k in range(20)]
+    assert suite.scenes == [f"drawn/{kind}/{k}" for kind in KINDS for k in range(20)]
     (tmp_path / "suite.toml").write_text(to_toml(suite), "utf-8")
     assert read_written(tmp_path / "suite.toml") == suite

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from synthetic_results import no_answer, results, row, shown, table, write_rows
@@ -117,3 +118,31 @@ def test_nothing_but_failures_is_a_section_too(tmp_path: Path) -> None:
     write(write_rows(tmp_path, [*rows, every_row()[0] | {"n": None, "scene": "drawn/"}]))
     assert pd.read_csv(tmp_path / "report" / "drawn.csv")["within"].to_list() == [0] * 4
     assert len(pd.read_csv(tmp_path / "report" / "drawn-failures.csv")) == 4 * SCENES
+
+
+def superelements(k: int, solver: str, prepare_s: float, solve_s: float, **figures: Any) -> dict[str, Any]:
+    usual = {"convert_s": 0.0, "prepare_s": prepare_s, "solve_s": solve_s, "form_s": 0.0}
+    other = {"solver": solver, "scene": f"drawn/superelements/{k}"}
+    return drawn(k, "newton", "dual", n=900 + k, **usual | figures) | other
+
+
+def test_superelements_are_compared_with_the_textbook_with_preparation(tmp_path: Path) -> None:
+    """A scene that it misses gives no ratio, one that newton misses the worst; tables of sizes lack them."""
+    rows = every_row()
+    for k, seconds in enumerate(((0.1, 0.1), (0.2, 0.4), (0.4, 0.4), (5.0, 5.0))):
+        rows.append(superelements(k, "newton", *seconds))
+        rows.append(superelements(k, "textbook-active-set", 0.0, 0.2, owner="textbook"))
+    rows[-1] |= no_answer("crashed")
+    section = section_of(tmp_path, rows)
+    found = table(section, "drawn-superelements").data.set_index("method").loc["newton (dual)"]
+    assert found[["scenes", "within"]].to_list() == [4, 4]
+    assert found[["median_ratio", "worst_ratio"]].to_list() == pytest.approx([3.0, 4.0])
+    assert found["worst_scene"] == "drawn/superelements/2"
+    assert found[["median_s", "worst_s"]].to_list() == pytest.approx([0.7, 10.0])
+    assert table(section, "drawn").data["n"].to_list() == [4386] * 4
+    assert len(table(section, "drawn-failures").data) == 1
+    missed = section_of(tmp_path / "missed", [*rows[:-4], rows[-4] | no_answer("time_limit"), *rows[-3:]])
+    assert (
+        table(missed, "drawn-superelements").data.set_index("method").loc["newton (dual)", "worst_ratio"]
+        == np.inf
+    )
