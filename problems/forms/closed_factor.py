@@ -44,7 +44,11 @@ class ClosedFactor:
 
     def _factor(self, C: Mask) -> None:
         self.B, self.rows = C, np.flatnonzero(C)
-        self.U = sla.cholesky(self.Q[np.ix_(self.rows, self.rows)], overwrite_a=True, check_finite=False)
+        Q_CC = self.Q[np.ix_(self.rows, self.rows)]
+        try:
+            self.U = sla.cholesky(Q_CC, overwrite_a=True, check_finite=False)
+        except np.linalg.LinAlgError as error:
+            raise np.linalg.LinAlgError(f"Q is not positive definite: {error}") from error
         self.changed = self.rows[:0]
         self.W = self.X = np.empty((len(self.rows), 0))
 
