@@ -51,10 +51,8 @@ class CondensedPlate:
 
     def unknowns(self, part: PartModel) -> tuple[Indices, Vector]:
         """The plate's unknowns that are the kept ones, node by node, and their signs."""
-        w, row = (
-            part.deflections[self.kept],
-            2 * len(part.plate.x),
-        )  # unknowns of w and w_x, or of w_y and w_xy
+        w = part.deflections[self.kept]
+        row = 2 * len(part.plate.x)  # unknowns of w and w_x, or of w_y and w_xy
         of_dof = {3: (w, 1.0), 4: (w + row, 1.0), 5: (w + 1, -1.0)}
         places, signs = zip(*(of_dof[dof] for dof in self.dofs), strict=True)
         return np.stack(places, axis=1).ravel(), np.tile(signs, len(w))

@@ -20,6 +20,14 @@ from report.results.rows import in_order
 
 PANEL = 3.0  # inches
 SUPERELEMENTS = f"{DRAWN}superelements/"
+OF_METHOD = [
+    word("solver (form)", "method"),
+    number("scenes", "scenes", whole),
+    number("solved and within", "within", whole),
+    number("median, s", "median_s"),
+    number("worst, s", "worst_s"),
+]
+WORST = word("worst scene", "worst_scene")
 
 
 def section(results: Results) -> Section | None:
@@ -69,16 +77,7 @@ def _times(cells: pd.DataFrame, limit: str) -> Table:
             line |= {"median_s": good["load_case_s"].median(), "worst_s": good["load_case_s"].max()}
             line |= {"worst_to_median": line["worst_s"] / line["median_s"]}
             lines.append(line | {"worst_scene": good["scene"].iloc[-1] if len(good) else ""})
-    columns = [
-        number("n", "n", whole),
-        word("solver (form)", "method"),
-        number("scenes", "scenes", whole),
-        number("solved and within", "within", whole),
-        number("median, s", "median_s"),
-        number("worst, s", "worst_s"),
-        number("worst / median", "worst_to_median"),
-        word("worst scene", "worst_scene"),
-    ]
+    columns = [number("n", "n", whole), *OF_METHOD, number("worst / median", "worst_to_median"), WORST]
     caption = f"*Medians and worst cases* of the answers that are reported solved and within {limit}."
     return Table("drawn", caption, pd.DataFrame(lines), columns, keys=2)
 
@@ -97,16 +96,8 @@ def _to_textbook(cells: pd.DataFrame, limit: str) -> Table:
         line |= {"median_s": mine["seconds"].median(), "worst_s": mine["seconds"].max()}
         line |= {"median_ratio": compared["ratio"].median(), "worst_ratio": compared["ratio"].max()}
         lines.append(line | {"worst_scene": compared["scene"].iloc[-1] if len(compared) else ""})
-    columns = [
-        word("solver (form)", "method"),
-        number("scenes", "scenes", whole),
-        number("solved and within", "within", whole),
-        number("median, s", "median_s"),
-        number("worst, s", "worst_s"),
-        number("to textbook, median", "median_ratio"),
-        number("to textbook, worst", "worst_ratio"),
-        word("worst scene", "worst_scene"),
-    ]
+    ratios = number("to textbook, median", "median_ratio"), number("to textbook, worst", "worst_ratio")
+    columns = [*OF_METHOD, *ratios, WORST]
     caption = (
         f"*Joints of superelements, preparation included*: answers that are solved and within {limit}, and "
         "their times relative to the fastest textbook method's; –: there is an answer missing."

@@ -51,13 +51,11 @@ class ClosedSets:
         """The closed contacts (m,) among every fourth one; where contacts are few, those that overlap."""
         p, C = load.p, load.p > 0
         order = Windows.of(self.nodes, len(p)).order
-        first = True
         for some in (order[::stride] for stride in STRIDES if len(p) >= FEWEST * stride):
             Q = np.asfortranarray(self.Q[np.ix_(some, some)])
-            begun = p[some] > 0 if first else C[some]
+            closed = _solved(Q, p[some], C[some])
             C = np.zeros(len(p), dtype=bool)
-            C[some] = _solved(Q, p[some], begun)
-            first = False
+            C[some] = closed
         return C
 
 

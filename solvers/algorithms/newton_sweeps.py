@@ -20,8 +20,8 @@ Qw = δp + δg takes no product, and α = 1 leaves x as it was. The sweeps corre
 
 An edge of contact creeps by about a row of contacts per set. If the first sets creep, the set of yielding
 contacts (`contact_sets.yielding_set`), whose edges move further, or that of an interior point
-(`interior_set`) where there is no banded M, replaces them. Far from the solution a
-product corrects more than further sets, so the limit on the sets of a sweep grows from sweep to sweep.
+(`interior_set`) where there is no banded M, replaces them. Far from the solution a product corrects more
+than further sets, so the limit on the sets of a sweep grows from sweep to sweep.
 """
 
 from collections.abc import Callable, Sequence
@@ -233,7 +233,7 @@ class Sweeps:
         begins = case.sweeps == 0 and not (dense and self.M is None)
         result = block_pivoting(at, case.C, self.compliance, floor, most, PATIENCE if begins else None)
         if begins and result.creeps:
-            if self.M is None or (len(self.M.band) > len(order) and not dense):  # M is Q⁻¹, and no band
+            if self.M is None or (self.M.whole and not dense):
                 C, factorisations = self.springs.interior_set(case.load)
                 C = C[order]
             else:
