@@ -138,8 +138,10 @@ class JointModel:
         K = K[order]
         column = place[K.indices]
         kept = column >= 0
-        ends = np.append(0, np.cumsum(kept))[K.indptr]
-        found = sp.csc_array((K.data[kept], column[kept], ends), shape=(size, size))  # symmetric
+        before = np.zeros(len(kept) + 1, dtype=np.int32)
+        np.cumsum(kept, out=before[1:])
+        entries = K.data[kept], column[kept], before[K.indptr]
+        found = sp.csc_array(entries, shape=(size, size))  # symmetric
         found.sort_indices()
         return found
 

@@ -9,7 +9,8 @@ is in LAPACK's lower storage, (b + 1, N) by columns: entry (j + d, j) in row d. 
 from entry (i, j + 1): with b as its leading dimension, each block is an ordinary matrix, not copied.
 """
 
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import nullcontext, suppress
 from functools import cache, partial
 from itertools import pairwise
 from typing import Any
@@ -58,14 +59,14 @@ def _fill(band: Matrix, K: sp.csc_array, start: int) -> None:
     entries[columns[lower] * len(band) + below[lower]] = values[lower]
 
 
-def factor_norm(K: sp.csc_array, width: int, s: float) -> float | None:
-    """‖|L||L|ᵀ‖_∞ ≥ ‖|L||L|ᵀ‖₂ of K − sI = LLᵀ, up to a relative rounding of 4bu; None where there is no L.
+def factor_pieces(K: sp.csc_array, width: int, s: float = 0.0) -> Iterator[tuple[int, int, Matrix]]:
+    """(start, count, columns of L from `start` on) of K − sI = LLᵀ, b columns more than count.
 
-    L is made some columns at a time and not kept, as its memory would take longer than its entries. The
-    columns that follow are replaced by a multiple of I, so large that it stays definite where K − sI is.
+    They stay in the processor's cache, and are overwritten by the next. The further ones belong to a multiple
+    of I in place of K's, so large that it stays definite where K − sI is. Raises LinAlgError where it is not.
     """
     size, most = K.shape[0], WINDOW * max(width, NARROW)
-    window, sums = np.empty((width + 1, most + width), order="F"), np.zeros(K.shape[0] + width)
+    window = np.empty((width + 1, most + width), order="F")
     taken = np.zeros((width, width))  # by the last columns from those that follow
     for start in range(0, size, most):
         count = min(most, size - start)
@@ -77,15 +78,35 @@ def factor_norm(K: sp.csc_array, width: int, s: float) -> float | None:
         _part(band, 0, 0, near, near)[...] -= np.tril(taken[:near, :near])
         L, info = band_cholesky(band)
         if info:
-            return None
+            raise np.linalg.LinAlgError(f"the leading minor {start + info} is not positive definite")
         if start + count < size:
             triangle = np.triu(_part(L, count, count - width, width, width))
             taken = triangle @ triangle.T
-        np.abs(L, out=L)
-        L[:, count:] = 0.0
-        of_columns = blas.dtbmv(width, L, np.ones(count + width), lower=1, trans=1)
-        sums[start : start + count + width] += blas.dtbmv(width, L, of_columns, lower=1)
-    return float(sums.max())
+        yield start, count, L
+
+
+def factor_norm(K: sp.csc_array, width: int, s: float) -> float | None:
+    """‖|L||L|ᵀ‖_∞ ≥ ‖|L||L|ᵀ‖₂ of K − sI = LLᵀ, up to a relative rounding of 4bu; None where there is no L.
+
+    L is not kept: fresh memory for it would take longer than its entries.
+    """
+    sums = np.zeros(K.shape[0] + width)
+    with suppress(np.linalg.LinAlgError):
+        for start, count, L in factor_pieces(K, width, s):
+            np.abs(L, out=L)
+            L[:, count:] = 0.0
+            of_columns = blas.dtbmv(width, L, np.ones(count + width), lower=1, trans=1)
+            sums[start : start + count + width] += blas.dtbmv(width, L, of_columns, lower=1)
+        return float(sums.max())
+    return None
+
+
+def rounded_factor(K: sp.csc_array, width: int, dtype: type[np.floating[Any]]) -> Entries:
+    """L (b + 1, N), column-major, of K = LLᵀ in a type of lower precision, made in double precision."""
+    rounded = np.empty((width + 1, K.shape[0]), dtype, order="F")
+    for start, count, L in factor_pieces(K, width):
+        rounded[:, start : start + count] = L[:, :count]
+    return rounded
 
 
 def band_cholesky(band: Matrix) -> tuple[Matrix, int]:
@@ -139,7 +160,7 @@ def _part(band: Matrix, row: int, column: int, rows: int, columns: int) -> Matri
 
 
 def band_blocks(
-    L: Matrix, start: int, stop: int, width: int, dtype: type[np.floating[Any]] = np.float64
+    L: Entries, start: int, stop: int, width: int, dtype: type[np.floating[Any]] = np.float64
 ) -> tuple[Entries, Entries]:
     """L_ii, lower triangular, and L_{i+1,i} (upper triangular, as many rows as there are)."""
     wide, after = stop - start, min(stop + width, L.shape[1]) - stop

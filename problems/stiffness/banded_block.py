@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from . import Indices, Matrix, U, Vector, gamma
-from .band_factor import band_cholesky, band_solve, factor_norm, lower_band
+from .band_factor import band_cholesky, band_solve, factor_norm, lower_band, rounded_factor
 from .block import NotPositiveDefinite, SparseBlock, scaled
 from .selected_inverse import BlockPart
 
@@ -63,4 +63,7 @@ class BandedBlock(SparseBlock):
 
     def local_compliance(self, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
         rows = A if self.order is None else sp.csc_array(A[self.order])
-        return BlockPart.of(self.L, rows, windows, single)
+        L = vars(self).get("L")
+        if L is None:  # it is made for this alone, and not kept
+            L = rounded_factor(self._ordered(self.matrix), self.width, np.float32 if single else np.float64)
+        return BlockPart.of(L, rows, windows, single)

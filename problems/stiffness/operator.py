@@ -187,7 +187,6 @@ class Stiffness:
         about four digits are right, enough for a preconditioner. None unless every block has a band along
         which the contacts of each window are near each other.
         """
-        self.ensure_factored()
         parts: list[BlockPart] = []
         for block, rows in self._blocks_with_rows():
             part = block.local_compliance(sp.csc_array(A[rows]), windows, single)

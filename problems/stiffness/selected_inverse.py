@@ -53,7 +53,7 @@ class SelectedInverse:
         return Z
 
 
-def selected_inverse(L: Matrix, rows: Indices, reach: int, single: bool = True) -> SelectedInverse:
+def selected_inverse(L: Entries, rows: Indices, reach: int, single: bool = True) -> SelectedInverse:
     """K⁻¹ at pairs of `rows`, ascending, that are at most `reach` unknowns apart. single : the precision."""
     dtype = np.float32 if single else np.float64
     trmm = blas.strmm if single else blas.dtrmm
@@ -117,7 +117,7 @@ class BlockPart:
     values: Matrix
 
     @classmethod
-    def of(cls, L: Matrix, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> "BlockPart | None":
+    def of(cls, L: Entries, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> "BlockPart | None":
         """The part from the band factor K = LLᵀ, for the contacts in each window.
 
         None if those of a window are too far apart in the numbering of the band.

@@ -199,7 +199,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "sums.max()": ("sums.min()",),
         "count + width] += blas": ("count + width] = blas",),
         "np.tril(taken[:near, :near])": ("0",),
-        "        if info:\n            return None\n": ("",),
+        "        if info:\n            raise": ("        if False:\n            raise",),
         "L[:, count:] = 0.0": ("pass",),
     },
     "problems/stiffness/cholmod.py": {
