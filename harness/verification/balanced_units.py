@@ -123,7 +123,9 @@ class Balanced:
                 data = panel.data * D[columns][panel.indices] * np.repeat(D[rows], np.diff(panel.indptr))
                 yield rows, columns, sp.csr_array((data, panel.indices, panel.indptr), shape=panel.shape)
             else:
-                yield rows, columns, panel * D[columns] * D[rows, None]
+                entries = panel * D[columns]
+                entries *= D[rows, None]
+                yield rows, columns, entries
 
 
 def _longest(M: Any) -> int:

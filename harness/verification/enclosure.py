@@ -79,7 +79,8 @@ def exponent(size: Matrix | float) -> Any:
 def cut(a: Matrix, top: Matrix | float, bits: int) -> tuple[Matrix, Matrix]:
     """a = piece + rest exactly, piece in units of 2^(top − bits + 1), for |a| ≤ 2^top."""
     sigma = 1.5 * np.exp2(top + 53 - bits)
-    piece = (a + sigma) - sigma
+    piece = a + sigma
+    piece -= sigma
     return piece, a - piece
 
 
@@ -130,7 +131,7 @@ class Residual:
         of_dense, of_sparse = of_each(gamma(terms + MORE)), of_each(gamma(longest + MORE))
         by_first, by_second, k = np.hstack([x1, x2, x3]), np.hstack([x1, after]), x1.shape[1]
         for rows, columns, panel in panels:
-            entries, count, above, of_row = _scaled(panel, unit[columns])
+            entries, count, above, total, of_row = _scaled(panel, unit[columns])
             M1, beyond = cut(entries, of_row(above), bits)
             if sharp:
                 M2, M3 = cut(beyond, of_row(above - bits), bits)
@@ -144,15 +145,12 @@ class Residual:
             else:
                 first = _times(panel, M1, x1[columns])
                 small = np.zeros_like(first)
-                rest = _times(panel, entries, after[columns])
-                if beyond.any():
-                    rest = rest + _times(panel, beyond, x1[columns])
+                rest = _times(panel, entries, after[columns]) + _times(panel, beyond, x1[columns])
             value, lost = two_sum(self.hi[rows], -first[:, :k])
             self.hi[rows], error = two_sum(value, -small)
             self.lo[rows] += lost + (error - rest)
             of_M2 = count * np.exp2(above - bits)
-            of_M1 = _with(panel, abs(entries)).sum(axis=1)[:, None] + of_M2
-            of_rows = np.hstack([of_M1, of_M2, of_M2 * 2.0**-bits, count + 1])
+            of_rows = np.hstack([total + of_M2, of_M2, of_M2 * 2.0**-bits, count + 1])
             self.error[rows] += of_rows @ (of_sparse if sp.issparse(panel) else of_dense)
 
     def subtract_small(self, panels: Iterable[Panel], longest: int, x: Matrix) -> None:
@@ -189,20 +187,20 @@ def _count(panel: Any) -> Vector:
     return np.diff(panel.indptr) if sp.issparse(panel) else np.full(panel.shape[0], panel.shape[1])
 
 
-def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[[Matrix], Matrix]]:
-    """The entries of M diag(unit); for each row (r, 1) their number, without the zeros of a dense M, and the
-    exponent of the largest; and a function that repeats figures of rows for their entries.
+def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Matrix, Callable[[Matrix], Matrix]]:
+    """The entries of M diag(unit); for each row (r, 1) their number, the exponent of the largest, and the sum
+    of their sizes; and a function that repeats figures of rows for their entries.
     """
     if not sp.issparse(panel):
         entries = panel * unit
-        top = exponent(abs(entries).max(axis=1, keepdims=True))
-        return entries, np.count_nonzero(entries, axis=1, keepdims=True), top, lambda of_row: of_row
+        size = abs(entries)
+        largest, total = size.max(axis=1, keepdims=True), size.sum(axis=1, keepdims=True)
+        return entries, panel.shape[1] * (largest > 0), exponent(largest), total, lambda of_row: of_row
     entries, count = panel.data * unit[panel.indices], np.diff(panel.indptr)
-    largest = np.zeros(len(count))
-    largest[count > 0] = (
-        np.maximum.reduceat(abs(entries), panel.indptr[:-1][count > 0]) if entries.size else 0
-    )
-    return entries, count[:, None], exponent(largest)[:, None], lambda of_row: np.repeat(of_row[:, 0], count)
+    size, largest = abs(entries), np.zeros(len(count))
+    largest[count > 0] = np.maximum.reduceat(size, panel.indptr[:-1][count > 0]) if entries.size else 0
+    figures = count[:, None], exponent(largest)[:, None], _with(panel, size).sum(axis=1)[:, None]
+    return entries, *figures, lambda of_row: np.repeat(of_row[:, 0], count)
 
 
 def _times(panel: Any, entries: Matrix, x: Matrix) -> Matrix:

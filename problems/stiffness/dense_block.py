@@ -19,7 +19,7 @@ from .block import ENTRIES_AT_A_TIME, Block, NotPositiveDefinite
 
 DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
 SMALL = 50  # unknowns below which eigenvalues are computed densely
-LEAST_ROWS = 16  # of a panel
+LEAST_ROWS = 64  # of a panel: fewer make slow products
 NORM_STEPS = 5  # of the power method, for v
 PANEL = 256  # columns
 #: Above this fraction of nonzero entries, a product with the whole matrix beats one with copied columns.

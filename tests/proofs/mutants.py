@@ -46,7 +46,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "self.error[rows] += of_rows": ("_ = of_rows",),
         "rounding * most_after, rounding * most, 0": ("0 * most, rounding * most, 0",),
         "most_after, rounding * most, 0 * most": ("most_after, 0 * most, 0 * most",),
-        "rest = rest + _times(panel, beyond, x1[columns])": ("pass",),
+        " + _times(panel, beyond, x1[columns])": ("",),
         "_times(panel, entries, after[columns])": ("_times(panel, beyond, after[columns])",),
         "// 2 + 1\n        unit": ("// 2 + 3\n        unit",),
         "x3, after = x3 + lo, after + lo": ("pass",),
@@ -63,7 +63,8 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         " + ETA * (norm > 0)": ("",),
     },
     "harness/verification/balanced_units.py": {
-        "panel * D[columns] * D[rows, None]": ("panel * D[rows, None]",),
+        "entries = panel * D[columns]": ("entries = panel * 1.0",),
+        "entries *= D[rows, None]": ("pass",),
         "panel.data * D[columns][panel.indices] * np.repeat": ("panel.data * np.repeat",),
         " * np.repeat(D[rows], np.diff(panel.indptr))": ("",),
         "self.D * both.f": ("both.f",),
