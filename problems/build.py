@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from problems.errors import InputError
 from problems.forms import Form
@@ -20,6 +20,8 @@ from problems.forms.prepared import Prepared
 from problems.model.effect import Effect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
+from problems.model.springs import Springs
+from problems.model.stage_answers import stage_scenes
 from problems.reporter import SILENT, Reporter
 from problems.storage import digest, fingerprint
 
@@ -34,10 +36,18 @@ SMALL = 200  # unknowns up to which any K is taken
 
 
 def model_of(scene: Scene) -> Model:
-    """The model of a scene; that of a joint is made once and kept by the scene object."""
+    """The model of a scene; that of a joint is made once and kept by the scene object.
+
+    Raises InputError if the scene has stages.
+    """
     if not isinstance(scene, JointScene):
         assert isinstance(scene, MatricesScene | ManufacturedScene)
         return GivenModel(scene)
+    if scene.stages:
+        names = [stage.name for stage in scene.stages]
+        raise InputError.one(
+            f"scene {scene.name}", "stage", names, "no stages here: each is a problem of its own"
+        )
     if scene.model is None:
         if isinstance(scene.joint, Joint):
             from problems.model.joint_model import JointModel
@@ -50,6 +60,29 @@ def model_of(scene: Scene) -> Model:
         object.__setattr__(scene, "model", made)
     model: Model = scene.model
     return model
+
+
+def models_of(scene: JointScene) -> list[Model]:
+    """The model of each stage, or of the scene if it has none. Raises InputError, which names the stages."""
+    models, faults = [], []
+    for name, part in stage_scenes(scene).items():
+        try:
+            models.append(model_of(part))
+        except InputError as error:
+            faults += error.in_stage(name).faults
+    if faults:
+        raise InputError(faults)
+    return models
+
+
+def shares_stiffness(scene: Scene, other: Scene) -> bool:
+    """Whether two joints have the same K; the first one then takes the model of the other."""
+    if not (isinstance(scene, JointScene) and isinstance(other, JointScene)):
+        return False
+    keys = [Springs.of(one).key(one.assembly_key) for one in (scene, other)]
+    if same := keys[0] == keys[1]:
+        object.__setattr__(scene, "model", replace(cast(Any, model_of(other)), scene=scene))
+    return same
 
 
 def prepared(scene: Scene, reporter: Reporter = SILENT, form: Form = "dual") -> Prepared:

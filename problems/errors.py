@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 CONTROL = re.compile("[\0-\x1f\x7f]")
 #: A hint for "parts\\top.npz" in a TOML file, which is a tab and op.npz.
@@ -51,6 +51,11 @@ class InputError(ValueError):
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.faults = list(faults)
         super().__init__("\n".join(map(str, self.faults)))
+
+    def in_stage(self, name: str) -> "InputError":
+        """The same faults, of a stage; without a name, of a scene that has none."""
+        where = f", in stage {name}" if name else ""
+        return InputError([replace(fault, key=f"{fault.key}{where}") for fault in self.faults])
 
     @classmethod
     def one(cls, where: object, key: str, value: object, allowed: str) -> "InputError":

@@ -30,6 +30,7 @@ from problems.model.effect_tables import EffectTable
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MatricesScene, Scene
+from problems.model.stages import Plan, Stage, acting_effects
 from problems.random_scenes import EXAMPLES, drawn_names, drawn_table
 
 from .errors import BACKSLASH, Fault, InputError
@@ -37,8 +38,10 @@ from .errors import BACKSLASH, Fault, InputError
 FOLDER = Path(__file__).resolve().parent
 SCENES = FOLDER / "scenes"
 ASSEMBLIES = FOLDER / "assemblies"
-KEYS = ("title", "assembly", "joint", "effect", "matrices")
+KEYS = ("title", "assembly", "joint", "effect", "stage", "matrices")
 TOML_MIB = 10
+#: The motions that are left to a plate, by the number of those that its supports hold.
+LOOSE = ("it moves and tilts freely", "it tilts about a point", "it tilts about a line")
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
 
 
@@ -138,6 +141,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint_path, joint_data = _joint_table(path, data, faults)
     tables = _effect_tables(joint_path, joint_data, faults) if joint_path != path else []
     tables += _effect_tables(path, data, faults)
+    stages = _stages(path, data, faults)
     faults += [Fault(str(path), key, value, unknown("key", key, KEYS)) for key, value in data.items()]
 
     for table in tables:
@@ -146,12 +150,40 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint = _joint(joint_path, joint_data, effects, faults)
     if joint is not None:
         for table in tables:
-            faults += table.faults(joint, tables)
-        if len(effects) == len(tables) and isinstance(joint, Joint):
-            faults += _floating(joint_path, joint, effects)
+            faults += table.faults(joint, () if stages else tables)
+            faults += table.unknown_stages([stage.name for stage in stages]) if stages else ()
+        if len(effects) == len(tables):
+            faults += _of_stages(path, joint_path, joint, effects, stages)
     if faults or joint is None:
         raise InputError(faults)
-    return JointScene(name, title, joint, effects)
+    return JointScene(name, title, joint, effects, stages)
+
+
+def _stages(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Stage, ...]:
+    """The stages that are right; `faults` says of the others what is wrong."""
+    stages = []
+    for k, table in enumerate(_tables(path, "stage", data, faults)):
+        try:
+            stages.append(Stage.model_validate(table))
+        except ValidationError as error:
+            faults += validation_faults(path, Stage, error, f"stage[{k}]")
+    return tuple(stages)
+
+
+def _of_stages(
+    path: Path, joint_path: Path, joint: AnyJoint, effects: tuple[Effect, ...], stages: tuple[Stage, ...]
+) -> Iterator[Fault]:
+    """Yield the faults of the stages, and of a part that is held in none, or not in a stage."""
+    plan = Plan(effects, stages, joint)
+    yield from (Fault(str(path), *fault) for fault in plan.faults())
+    steps = [(f" in stage {step.stage.name}", step.elements) for step in plan.steps]
+    told: set[str] = set()
+    for where, elements in [*steps, *([] if steps else [("", plan.everything)])]:
+        if isinstance(joint, Joint) and not plan.wrong:
+            acting = tuple(acting_effects(effects, elements, joint).values())
+            for fault in _floating(joint_path, joint, acting, where):
+                yield from () if fault.key in told else (fault,)
+                told.add(fault.key)
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:
@@ -201,14 +233,19 @@ def _joint(
 
 
 def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> list[EffectTable]:
-    tables = data.pop("effect", [])
+    return [EffectTable(where, k, table) for k, table in enumerate(_tables(where, "effect", data, faults))]
+
+
+def _tables(where: Path, key: str, data: dict[str, Any], faults: list[Fault]) -> list[dict[str, Any]]:
+    """The tables [[key]]; none, which `faults` then says, if it is something else."""
+    tables = data.pop(key, [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        faults.append(Fault(str(where), "effect", tables, "tables [[effect]]"))
+        faults.append(Fault(str(where), key, tables, f"tables [[{key}]]"))
         return []
-    return [EffectTable(where, k, table) for k, table in enumerate(tables)]
+    return tables
 
 
-def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...]) -> Iterator[Fault]:
+def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...], where: str) -> Iterator[Fault]:
     held: dict[str, list[tuple[float, float]]] = {part.name: [] for part in joint.part}
     for effect in effects:
         if isinstance(effect, StiffnessEffect) and effect.part in held:
@@ -216,8 +253,11 @@ def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...]) -> Iterator
     for part in joint.part:
         points = held[part.name]
         # A rigid motion of a plate is a + bx + cy: three points off a line hold it.
-        if not part.clamped and np.linalg.matrix_rank([[1, x, y] for x, y in points] or [[0.0]]) < 3:
-            allowed = "needs a clamped edge, or supports at three points off a line"
+        held_motions = np.linalg.matrix_rank([[1, x, y] for x, y in points] or [[0.0]])
+        if not part.clamped and held_motions < 3:
+            allowed = (
+                f"needs a clamped edge, or supports at three points off a line{where}: {LOOSE[held_motions]}"
+            )
             yield Fault(str(path), f"part.{part.name}", points or "no support", allowed)
 
 

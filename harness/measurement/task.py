@@ -15,10 +15,9 @@ from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
 from problems.forms.problem import in_form
-from problems.scene_files import read_scene
 
 from .solver_descriptions import Description
-from .worker import Outcome, measure
+from .worker import Outcome, measure, scene_to_measure
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def run_task(task: Task, answers: Path) -> TaskResult:
 def run_task_on_worker(task: Task) -> TaskResult:
     """Measure on a worker of a scheduler, which has the assembly in its own cache, or builds it first."""
     first = task.batch[0]
-    scene = read_scene(first.source)
+    scene = scene_to_measure(task.batch)
     _ = in_form(prepared(scene, form=first.form), first.form).arrays  # made before the clock starts
     with tempfile.TemporaryDirectory() as folder:
         result = run_task(task, Path(folder))

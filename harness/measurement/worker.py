@@ -25,7 +25,7 @@ from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures, s
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
-from problems.model.scene import Scene
+from problems.model.scene import JointScene, Scene
 from problems.reporter import Reporter
 from problems.scene_files import read_scene
 from solvers.base import Answer
@@ -110,7 +110,7 @@ class Run(Reporter):
         if m.form not in solver.forms:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.step("load_s"):
-            scene = read_scene(m.source)
+            scene = scene_to_measure(self.measurements)
             problem = in_form(prepared(scene, form=m.form), m.form)
             start = time.perf_counter()
             cases = list(load_cases(scene, self.measurements))
@@ -196,6 +196,17 @@ class Run(Reporter):
         except OSError as error:
             return {"status": "failed", "answer": None, "cannot_save": f"{file}: {error}"}
         return {"status": answer.status, "answer": f"answers/{file.name}"}
+
+
+def scene_to_measure(measurements: Sequence[Measurement]) -> Scene:
+    """The scene; of one with stages the last, but for a series, which takes no stages."""
+    first = measurements[0]
+    scene = read_scene(first.source)
+    if first.series is None and isinstance(scene, JointScene) and scene.stages:
+        from harness.verification.reference_problem import last_stage
+
+        return last_stage(scene, first.suite.reference_limit_s)
+    return scene
 
 
 def load_cases(scene: Scene, measurements: Sequence[Measurement]) -> Iterator[LoadCase]:

@@ -63,7 +63,7 @@ class MovableFasteners:
             points, faults, labels = grid(self.bare, rows, columns), [], []
         else:
             table = read_columns(Path(holes), ("x", "y"), options)
-            points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.labels
+            points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.words["name"]
         faults = faults + self.faults(points, holes)
         if faults:
             raise InputError(faults)

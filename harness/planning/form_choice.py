@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import log2
 
 from harness.results.provenance import physical_memory_mib
-from problems.build import model_of
+from problems.build import models_of
 from problems.errors import InputError
 from problems.forms import DENSE_FORMS, Form, default_form
 from problems.input.user_matrices import SMALL, holds_sparse, stored_matrices
@@ -59,7 +59,7 @@ def size_of(scene: Scene) -> Size | None:
         case JointScene(joint=Joint() as joint):
             return _of_joint(scene, joint)
         case JointScene() if _holds_sparse(scene):
-            assembly = model_of(scene).sparse().assembly
+            assembly = models_of(scene)[-1].sparse().assembly
         case ManufacturedScene() if scene.sparse and sum(scene.block_sizes) > SMALL:
             assembly = scene.made.assembly
         case MatricesScene() if holds_sparse(files := dict(scene.files)):
@@ -76,7 +76,7 @@ def size_of(scene: Scene) -> Size | None:
 def _holds_sparse(scene: JointScene) -> bool:
     from problems.model.superelement_model import SuperelementModel  # of superelements only
 
-    model = model_of(scene)
+    model = models_of(scene)[-1]
     return isinstance(model, SuperelementModel) and model.holds_sparse
 
 
@@ -148,7 +148,7 @@ def _by_rule(scene: Scene, size: Size | None, taken: Sequence[Form], cases: int)
     if not dense or "sparse" not in taken or size is None:
         return Choice(default_form(dense or taken))
     fits = size.dense_peak_mib <= physical_memory_mib()
-    cached = isinstance(scene, JointScene) and model_of(scene).built
+    cached = isinstance(scene, JointScene) and all(model.built for model in models_of(scene))
     if fits and (cached or size.dense_mib <= SMALL_MIB * cases):
         return Choice(default_form(dense))
     return Choice("sparse", f"dense matrices would take {size.dense_mib:.0f} MiB")

@@ -1,15 +1,12 @@
 """The files of an answer, from which the report draws it: the arrays solution.npz, the record solution.json.
 
 The record holds how the scene was solved, in which steps and time, what was skipped, and the error bound. It
-also says where parts and contacts are in x and λ, what a picture marks, and the force in each fastener. An
-installed fastener is a spring of stiffness k along t = w_a − w_b, set at the approach a: it pulls its parts
-together with k (a − tᵀx), N, and pushes them apart where that is negative.
+also says where parts and contacts are in x and λ, what a picture marks, and the force in each fastener.
 """
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from itertools import product, repeat
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,12 +15,11 @@ from harness.results.provenance import machine, provenance, resident_mib
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, Vector
-from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
-from problems.model.positions import FORCES
 from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.reporter import Stage
 
+from .fastener_forces import fastener_forces
 from .solution import Solution
 from .validate import digits_sentence
 
@@ -155,21 +151,3 @@ def _part(name: str, rows: slice, outline: list[float]) -> dict[str, Any]:
 def _extent(nodes: Vector) -> list[float]:
     """The smallest and largest x, then y, of some nodes."""
     return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist()
-
-
-def fastener_forces(scene: Scene, x: Vector) -> Iterator[dict[str, Any]]:
-    """One entry per fastener and contact: kind, pair, x and y in mm, force_N. x : (n,) mm."""
-    if not isinstance(scene, JointScene):
-        return
-    for effect in scene.effects:
-        joint, fastener = scene.joint, cast(Any, effect)  # its kind is not imported, so that no other is
-        if isinstance(effect, SpringEffect):
-            T, k = effect.springs(joint)
-            pairs, forces = effect.tied(joint), (k * (fastener.approach - T.T @ x)).tolist()
-        elif preloads := [getattr(effect, name) for name in FORCES if hasattr(effect, name)]:
-            pairs, forces = fastener.pairs(joint), repeat(*preloads)
-        else:
-            continue
-        places = product(pairs, effect.marks(joint).tolist())
-        for (pair, (at_x, at_y)), force in zip(places, forces, strict=False):
-            yield {"kind": effect.kind, "pair": list(pair), "x": at_x, "y": at_y, "force_N": force}

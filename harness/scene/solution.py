@@ -15,11 +15,14 @@ from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, opened
 from problems.errors import InputError
 from problems.forms import FORMS, Form
-from problems.forms.assembly import Vector
-from problems.model.scene import Scene
+from problems.forms.assembly import Matrix, Vector
+from problems.model.scene import JointScene, Scene
+from problems.model.stage_answers import locked, through
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene, scene_of
 from solvers.base import Answer, Solver
+
+from .stages import StageAnswer
 
 LINEAR = "linear solve with the Cholesky factors of K"
 Source = Scene | str | Path | Mapping[str, Any]
@@ -59,6 +62,9 @@ class Solution:
         The form, and why it was chosen.
     problem : ReferenceProblem
         The matrices, loads and reference.
+    stages : tuple of StageAnswer
+        What each stage of the scene has reached; the other entries are those of the last one. Empty without
+        stages.
     """
 
     lam: Vector
@@ -75,6 +81,7 @@ class Solution:
     seconds: dict[str, float]
     choice: Choice
     problem: ReferenceProblem
+    stages: tuple[StageAnswer, ...] = ()
 
     @property
     def x(self) -> Vector:
@@ -169,30 +176,76 @@ def solve(
     >>> print(f"{answer.gap.max():.3f} mm, {answer.judgement.verdict}")
     0.668 mm, within
     """
-    scene, seconds = load_scene(scene), {}
-
-    @contextmanager
-    def step(name: str) -> Iterator[None]:
-        start = time.perf_counter()
-        with reporter.step(name):
-            yield
-        seconds[name] = time.perf_counter() - start
-
+    scene, clock = load_scene(scene), _Clock(reporter)
     named = None if solver is None else solver_named(solver, options)
-    with step("choosing the form"):
+    with clock.step("choosing the form"):
         forms = FORMS if named is None else named[1].forms
         asked = form_of(named[0], forms, form) if form and named else form
         choice = chosen_form(scene, forms, asked)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
+    if not (isinstance(scene, JointScene) and scene.stages):
+        return _solved(scene, named, choice, tolerance, limit_s, clock)
+    like: ReferenceProblem | None = None
+
+    def of_stage(part: JointScene, approaches: Matrix) -> tuple[Vector, Solution]:
+        nonlocal like
+        clock.where = f"{part.title}: "
+        answer = _solved(locked(part, approaches[:, 0]), named, choice, tolerance, limit_s, clock, like)
+        like = answer.problem
+        return like.prepared.assembly.at_junction(like.reference.x), answer
+
+    history = []
+    for reached in through(scene, of_stage):
+        answer, stage = reached.answer, locked(reached.scene, reached.approaches[:, 0])
+        history.append(
+            StageAnswer(
+                name=reached.stage.name,
+                scene=stage,
+                x=answer.x,
+                lam=answer.lam,
+                gap=answer.gap,
+                judgement=answer.judgement,
+                error_bound_mm=answer.error_bound_mm,
+            )
+        )
+    return replace(answer, stages=tuple(history))
+
+
+class _Clock:
+    """Takes the time of steps, `seconds`, and tells a reporter of them; `where` begins its sentences."""
+
+    def __init__(self, reporter: Reporter) -> None:
+        self.reporter, self.where = reporter, ""
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        with self.reporter.step(f"{self.where}{name}"):
+            yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+def _solved(
+    scene: Scene,
+    named: tuple[str, Solver] | None,
+    choice: Choice,
+    tolerance: float,
+    limit_s: float | None,
+    clock: _Clock,
+    like: ReferenceProblem | None = None,
+) -> Solution:
+    """The judged answer to a scene without stages. like : see `opened`."""
+    reporter, step = clock.reporter, clock.step
     with step("matrices, loads and gaps"):
-        problem = opened(scene, choice.form, reporter, limit_s)
+        problem = opened(scene, choice.form, reporter, limit_s, like)
         problem.prepared.assembly.K.ensure_factored()
         p = problem.prepared.overlap(problem.load)
     if np.isnan(p).any():
         largest = float(abs(problem.load.f).max(initial=0.0))
         raise InputError.one(scene.source_of("f"), "largest |f|", largest, "loads with finite displacements")
-    for note in problem.prepared.assembly.notes:
+    for note in problem.prepared.assembly.notes if like is None else ():
         reporter.say(note)
     with step("answer with a proven bound"):
         reference = problem.reference
@@ -225,7 +278,7 @@ def solve(
         from_reference=named is None,
         unknowns=x,
         closest_mm=closest,
-        seconds=seconds,
+        seconds=clock.seconds,
         choice=choice,
         problem=problem,
     )

@@ -16,12 +16,15 @@ from harness.terminal.docstrings import docstring
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import about, expected_error
-from problems.build import model_of, prepared
+from problems.build import models_of, prepared, shares_stiffness
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
+from problems.model.effect import Effect
+from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
+from problems.model.stage_answers import stage_scenes
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from report.document.numbers import counted
@@ -75,7 +78,8 @@ def _plates(scene: JointScene, size: Size, console: Console) -> None:
     console.print(_contents(scene))
     contacts = counted(size.m, "contact")
     console.print(f"n = {size.n} unknowns, m = {contacts}; this machine has {physical} MiB.")
-    cached = "; the assembly is in the cache" if model_of(scene).built else ""
+    built = all(model.built for model in models_of(scene))
+    cached = "; the assembly is in the cache" if built else ""
     console.print(
         f"Dense forms: K, its factors and Q take {size.dense_mib:.0f} MiB{cached}, the process up to "
         f"{size.dense_peak_mib:.0f} MiB."
@@ -94,7 +98,8 @@ def _matrices(scene: Scene, console: Console) -> None:
     choice = chosen_form(scene, FORMS, None)
     if choice.form == "sparse":
         console.print(f"Sparse form by default: {choice.why}.")
-    assembly = prepared(scene, form=choice.form).assembly
+    last = [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
+    assembly = prepared(last, form=choice.form).assembly
     print_facts(scene.name, assembly, console)
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
@@ -145,8 +150,22 @@ def _contents(scene: JointScene) -> Table:
 
 def _with_effects(table: Table, scene: JointScene) -> Table:
     for effect in scene.effects:
-        table.add_row(f"effect {effect.kind}", docstring(type(effect)).partition("\n")[0])
+        name = f" {effect.name}" if effect.name else ""
+        table.add_row(f"effect {effect.kind}{name}", docstring(type(effect)).partition("\n")[0])
+    if scene.stages:
+        earlier: dict[str, JointScene] = {}
+        for name, part in stage_scenes(scene).items():
+            like = next((first for first, one in earlier.items() if shares_stiffness(part, one)), None)
+            earlier |= {name: part} if like is None else {}
+            acts = ", ".join(_counted(effect, scene.joint) for effect in part.effects)
+            table.add_row(f"stage {name}", acts + (f"; K of {like}" if like is not None else ""))
     return table
+
+
+def _counted(effect: Effect, joint: AnyJoint) -> str:
+    """The name or kind of an effect, with the number of its points if it has some."""
+    count = effect.element_count(joint)
+    return f"{effect.name or effect.kind}{f' ({count})' if count else ''}"
 
 
 def print_facts(name: str, assembly: Assembly, console: Console) -> None:

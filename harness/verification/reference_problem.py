@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from harness.planning.form_choice import size_of
 from harness.results import records
 from harness.results.answer_files import read_answer
-from problems.build import load_case, prepared
+from problems import storage
+from problems.build import load_case, prepared, shares_stiffness
 from problems.errors import InputError
 from problems.forms import Form
-from problems.forms.assembly import LoadCase, Vector
+from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import JointScene, Scene
+from problems.model.stage_answers import locked, stage_scenes, through
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
@@ -105,14 +108,44 @@ def opened(
     form: Form = "dual",
     reporter: Reporter = SILENT,
     limit_s: float | None = None,
+    like: ReferenceProblem | None = None,
 ) -> ReferenceProblem:
-    """Open or build a scene. Raises InputError.
+    """Open or build a scene, of one with stages the last. Raises InputError.
 
-    form : the form of the answers; in the sparse form, x has an entry per unknown of the model.
+    form : the form of the answers; in the sparse form, x has an entry per unknown of the model. like : a
+    problem in this form whose matrices are taken, with their factors, if they are those of the scene.
     """
-    data = prepared(scene, reporter, form)
+    last = last_stage(scene, limit_s)
+    shared = like is not None and shares_stiffness(last, like.scene)
+    data = like.prepared if like is not None and shared else prepared(last, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
-    return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
+    return ReferenceProblem(scene, data, load_case(last, form), form, limit_s)
+
+
+def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
+    """The last stage of a scene as a scene of its own; the scene itself if it has no stages.
+
+    Its approaches are those of the proven references of the stages before, solved in the sparse form unless
+    matrices are dense. They are in the cache, so that all processes have the same. Raises InputError.
+    limit_s : see ReferenceProblem.
+    """
+    if not (isinstance(scene, JointScene) and scene.stages):
+        return scene
+    form: Form = "sparse" if size_of(scene) else "dual"
+    like: ReferenceProblem | None = None
+
+    def solve(part: JointScene, approaches: Matrix) -> tuple[Vector, None]:
+        nonlocal like
+        like = opened(locked(part, approaches[:, 0]), form, limit_s=limit_s, like=like)
+        return like.prepared.assembly.at_junction(like.reference.x), None
+
+    def made() -> storage.Entry:
+        *_, last = through(scene, solve)
+        return {"approaches": last.approaches}, {}
+
+    code = storage.fingerprint([Path(__file__)], within=["harness/verification", "problems"])
+    arrays, _ = storage.load_or_make(storage.digest("stages", scene.key, code), made)
+    return locked([*stage_scenes(scene).values()][-1], arrays["approaches"][:, 0])
 
 
 def measurable(

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
-from problems.input.bounded_types import Finite, Positive
+from problems.input.bounded_types import Positive
 from problems.model.effect import Effect, SpringEffect
 from problems.model.interface import AnyJoint, across
 from problems.model.joint import TOOL, Faults, Pair
@@ -16,16 +16,17 @@ from problems.model.positions import Positions
 
 
 class InstalledFasteners(Positions, SpringEffect):
-    """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = w_a − w_b.
+    """K += k t tᵀ, f += (preload + k · approach) t, t = w_a − w_b, for each fastener.
 
-    stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
-    shank through 20 mm. approach in mm: by how much the gap was reduced when the fastener was set; 0 keeps
-    the gap as it was, the value of the initial gap keeps it closed. Each fastener acts where it is: w_a and
-    w_b are the weights of its place on the nodes of each part around it, along the normal of the first.
+    It is a spring that pulls its parts together with preload + k (approach − tᵀx). stiffness k in N/mm along
+    the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium shank through 20 mm. approach in
+    mm: by how much the gap was reduced when the fastener was set; 0 keeps the gap as it was, the value of the
+    initial gap keeps it closed. A stage that sets the fastener locks what it has reached. preload in N: the
+    force that the fastener keeps where it is set. Each fastener acts where it is: w_a and w_b are the weights
+    of its place on the nodes of each part around it, along the normal of the first.
     """
 
     stiffness: Annotated[Positive, "N/mm"] = 1e5
-    approach: Annotated[Finite, "mm"] = 0.0
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
@@ -43,7 +44,3 @@ class InstalledFasteners(Positions, SpringEffect):
         T = sp.csc_array(sp.hstack(columns))
         T.sort_indices()
         return T, np.full(T.shape[1], self.stiffness)
-
-    def force(self, joint: AnyJoint) -> Vector:
-        T, k = self.springs(joint)
-        return T @ (k * self.approach)

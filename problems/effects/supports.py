@@ -1,13 +1,14 @@
 """Point supports: springs between the part and the ground."""
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Self
 
 import scipy.sparse as sp
 from pydantic import Field
 
 from problems.input.bounded_types import Finite, Positive
 from problems.model.effect import StiffnessEffect
-from problems.model.interface import on_part
+from problems.model.interface import AnyJoint, on_part
 from problems.model.joint import Faults
 from problems.model.plate import Plate
 
@@ -24,6 +25,12 @@ class Supports(StiffnessEffect):
     @property
     def held_points(self) -> tuple[tuple[float, float], ...]:
         return self.points
+
+    def element_count(self, joint: AnyJoint) -> int:
+        return len(self.points)
+
+    def only(self, elements: Sequence[int], joint: AnyJoint) -> Self:
+        return self.model_copy(update={"points": tuple(self.points[k] for k in elements)})
 
     def misfits(self, plate: Plate) -> Faults:
         for k, point in enumerate(self.points):

@@ -39,6 +39,8 @@ Name = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=ONE
 
 #: Tags of a parameter that may be a value or a word, such as "auto"; left out of the keys in messages.
 VALUE, WORD = "a value", "a word"
+#: Tags of a parameter that may be a number or a list of numbers.
+NUMBER, NUMBERS = "a number", "numbers"
 
 
 def resolved(path: Path) -> Path:
@@ -75,7 +77,7 @@ def validation_faults(
         depth = len(item["loc"])
         if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
             continue  # a consequence of a fault inside it
-        keys = [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD))]
+        keys = [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD, NUMBER, NUMBERS))]
         key = ".".join(filter(None, keys))
         value = None if item["type"] == "missing" else item["input"]
         unit, allowed = _unit(model, item["loc"]), _allowed(item, model)
@@ -85,6 +87,11 @@ def validation_faults(
 def is_word(value: object) -> str:
     """The tag of a value: WORD for a string, else VALUE."""
     return WORD if isinstance(value, str) else VALUE
+
+
+def is_list(value: object) -> str:
+    """The tag of a value: NUMBERS for a list, else NUMBER."""
+    return NUMBERS if isinstance(value, list | tuple) else NUMBER
 
 
 def unknown(kind: str, value: object, names: Sequence[str]) -> str:

@@ -36,6 +36,7 @@ LENGTHS |= dict.fromkeys(("um", "\u03bcm"), Fraction("0.001"))
 LENGTHS |= dict.fromkeys(("in", "inch", '"'), Fraction("25.4"))
 #: The units of columns that are no lengths, by name.
 UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT)
+WORDS = ("name", "stage")  # headings of columns of words
 BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))
 HEADING = re.compile(rf"(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
 PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
@@ -88,14 +89,14 @@ class Rows:
     """The good rows of a file, with their line numbers, and the faults of the others.
 
     columns : the names of the columns that are there, in the order of the cells of a row.
-    labels : the cell of each row under the heading "name"; empty without such a column.
+    words : the cell of each row under the headings "name" and "stage"; empty without such a column.
     """
 
     path: Path
     columns: list[str] = field(default_factory=list)
     rows: list[tuple[float, ...]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
-    labels: list[str] = field(default_factory=list)
+    words: dict[str, list[str]] = field(default_factory=lambda: {heading: [] for heading in WORDS})
     faults: list[Fault] = field(default_factory=list)
 
 
@@ -182,7 +183,7 @@ def _read(table: Cells, headings: Mapping[str, str], options: TableOptions, read
         allowed = f"a header line with the columns {listed}, once each"
         raise InputError.one(table.path, f"line {line}", table.text[line - 1], allowed)
     columns = [names.index(name) for name in wanted]
-    label = names.index("name") if "name" in names else None
+    words = {word: names.index(word) for word in WORDS if word in names}
     scales = [UNITS.get(name, LENGTHS) for name in headings]
     mark = table.decimal_mark(columns)
     units, seen, below = [there[k][1] for k in columns], [""] * len(columns), True
@@ -218,8 +219,8 @@ def _read(table: Cells, headings: Mapping[str, str], options: TableOptions, read
         scaled = zip(numbers, factors, strict=True)
         read.rows.append(tuple(value * by.numerator / by.denominator for (value, _), by in scaled))
         read.lines.append(line)
-        if label is not None:
-            read.labels.append(cells[label])
+        for word, column in words.items():
+            read.words[word].append(cells[column] if column < len(cells) else "")
     if not read.rows and not read.faults:
         read.faults.append(Fault(str(table.path), "rows", 0, "at least one row below the header"))
 

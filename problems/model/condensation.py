@@ -105,7 +105,7 @@ def part_key(part: PartModel) -> str:
     modules = (inspect.getmodule(type(effect)) for effect in part.effects)
     files = [Path(inspect.getfile(module)) for module in modules if module]
     code = fingerprint([*files, Path(__file__)], within=CODE)
-    data = [effect.model_dump(mode="json", exclude={"part"}) for effect in part.effects]
+    data = [effect.model_dump(mode="json", exclude={"part", "name"}) for effect in part.effects]
     return storage.digest("part", part.geometry, data, code)
 
 
@@ -149,7 +149,9 @@ def condensed_load(
     interior : returns i and K_ii; called if the load is not in the cache.
     """
     code = fingerprint([Path(inspect.getfile(type(effect))), Path(__file__)], within=CODE)
-    key = storage.digest("load", part_key(part), effect.model_dump(mode="json", exclude={"part"}), code)
+    key = storage.digest(
+        "load", part_key(part), effect.model_dump(mode="json", exclude={"part", "name"}), code
+    )
 
     def made() -> storage.Entry:
         f, j, (i, K_ii) = effect.load(part), part.deflections, interior()

@@ -7,14 +7,14 @@ effect that acts on contacts and adds to the gap derives from two: `class Shims(
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 import scipy.sparse as sp
-from pydantic import Field, PrivateAttr
+from pydantic import Discriminator, Field, PrivateAttr, Tag
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.bounded_types import Range
+from problems.input.bounded_types import NUMBER, NUMBERS, Finite, Name, NotNegative, Range, is_list
 
 from .interface import AnyJoint
 from .joint import Faults, Pair, Table
@@ -39,12 +39,21 @@ class Effect(Table):
     #: Columns of the CSV that a table may name as `file` in place of `points`; empty if it may not.
     columns: ClassVar[tuple[str, ...]] = ()
     kind: str
+    #: By which the stages of a scene call it.
+    name: Name | None = None
     #: The line of each point in its file; empty if the points are from a list.
     _lines: tuple[str, ...] = PrivateAttr(())
+    #: The stage of each point in its file; empty if the file has no column `stage`.
+    _stages: tuple[str, ...] = PrivateAttr(())
 
     def point_name(self, k: int) -> str:
         """The name of point k in messages: its line in the file, or points[k]."""
         return self._lines[k] if self._lines else f"points[{k}]"
+
+    @property
+    def stage_words(self) -> tuple[str, ...]:
+        """The name of the stage that sets each point, from the file of the points; empty if it has none."""
+        return self._stages
 
     @property
     def contacts(self) -> tuple[Pair, ...]:
@@ -64,6 +73,14 @@ class Effect(Table):
             x and y in mm.
         """
         return np.zeros((0, 2))
+
+    def element_count(self, joint: AnyJoint) -> int:
+        """The number of elements, at points, that stages can set one by one; 0 if it only acts as a whole."""
+        return 0
+
+    def only(self, elements: Sequence[int], joint: AnyJoint) -> Self:
+        """The effect of some of its elements."""
+        return self
 
     def faults(self, joint: AnyJoint, others: Sequence["Effect"] = ()) -> Faults:
         """Yield the parameters that do not fit the joint, or contradict other effects of the scene.
@@ -219,10 +236,41 @@ class GapEffect(Effect):
 
 
 class SpringEffect(ForceEffect):
-    """Springs between two parts at points of the junction: K += T diag(k) Tᵀ, after condensation.
+    """Springs between two parts at points of the junction, after condensation.
 
-    Its `force` is that of the springs where the parts have not moved, T k · approach.
+        K += T diag(k) Tᵀ,    f += T (preload + k · approach)
+
+    Each pulls the parts together with preload + k (approach − tᵀx), N.
+
+    Parameters
+    ----------
+    approach : float or tuple of float
+        The elongation at which a spring has its preload, mm: of all springs, or of each column of T.
+    preload : float
+        N.
     """
+
+    approach: Annotated[
+        Annotated[Finite, Tag(NUMBER)] | Annotated[tuple[Finite, ...], Tag(NUMBERS)],
+        Discriminator(is_list),
+        "mm",
+    ] = 0.0
+    preload: Annotated[NotNegative, Field(exclude_if=lambda force: force == 0), "N"] = 0.0
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
+        count = len(self.tied(joint)) * len(self.marks(joint))
+        if isinstance(self.approach, tuple) and len(self.approach) != count:
+            yield "approach", list(self.approach), f"one number, or one for each of {count} springs"
+
+    def force(self, joint: AnyJoint) -> Vector:
+        T, k = self.springs(joint)
+        return T @ (k * self.approach + self.preload)
+
+    def tension(self, joint: AnyJoint, x: Vector) -> Vector:
+        """(r,) the force of each spring at displacements x (n,) mm; N."""
+        T, k = self.springs(joint)
+        return k * (self.approach - T.T @ x) + self.preload
 
     @abstractmethod
     def tied(self, joint: AnyJoint) -> list[Pair]:

@@ -70,6 +70,7 @@ class EffectTable:
             self.effect = effect.model_validate(content)
             if self.rows:
                 self.effect._lines = tuple(f"{self.rows.path.name}, line {line}" for line in self.rows.lines)
+                self.effect._stages = tuple(self.rows.words["stage"])
         except ValidationError as error:
             faults = validation_faults(self.where, effect, error, self._name)
             keys = ((fault.key.removeprefix(self._name).lstrip("."), fault) for fault in faults)
@@ -90,6 +91,12 @@ class EffectTable:
         if not isinstance(missing, list) or (missing and "gap" not in effect.columns):
             allowed = "of a measured_gap, a list of what marks a point without a gap, as [9999, 'NaN']"
             yield "missing", missing, allowed
+
+    def unknown_stages(self, names: Sequence[str]) -> Iterator[Fault]:
+        """Yield the rows of the file that name none of the stages."""
+        words = enumerate(self.effect.stage_words if self.effect else ())
+        faults = ((k, word, unknown("stage", word, names)) for k, word in words if word not in names)
+        yield from self._located((f"points[{k}]", word, allowed) for k, word, allowed in faults)
 
     def faults(self, joint: AnyJoint, tables: Sequence["EffectTable"]) -> Iterator[Fault]:
         """Yield the faults with respect to the joint and to the effects of the other tables."""

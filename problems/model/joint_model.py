@@ -57,6 +57,7 @@ class JointModel:
         assembly, coarser = self.assembly(), self.graded()
         seconds = time.perf_counter() - start
         key = storage.digest("sparse", self.scene.assembly_key, fingerprint([Path(__file__)], CODE))
+        key = self.springs.key(key) if self.springs else key
         like = coarser.assembly if coarser.work < WORTH * self.work else None
         return SparsePrepared(assembly, key, seconds, self.scene.source_of, coarser=like)
 

@@ -1,7 +1,7 @@
 """The base class of effects at points of the junction, at its nodes or between them."""
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -73,6 +73,16 @@ class Positions(ContactEffect, ForceEffect):
             return places
         nodes = joint.nodes_of(joint.names[0])
         return np.array([nodes[((nodes - place) ** 2).sum(axis=1).argmin()] for place in places])
+
+    def element_count(self, joint: AnyJoint) -> int:
+        return len(self.marks(joint))
+
+    def only(self, elements: Sequence[int], joint: AnyJoint) -> Self:
+        marks = self.marks(joint)
+        points = tuple(map(tuple, marks[elements].tolist()))
+        return (
+            self if len(points) == len(marks) else self.model_copy(update={"points": points, "pattern": None})
+        )
 
     def unusual(self, joint: AnyJoint) -> Faults:
         thinnest = joint.thinnest

@@ -15,6 +15,7 @@ from problems.storage import digest
 from .effect import Effect, StiffnessEffect
 from .interface import AnyJoint
 from .joint import Table
+from .stages import Stage
 
 E = TypeVar("E", bound=Effect)
 
@@ -84,11 +85,13 @@ class Scene(ABC):
 class JointScene(Scene):
     """A joint and the effects that the scene includes.
 
+    stages : by default all effects act at once; see `stage_answers.through`.
     model : see `problems.build.model_of`; neither copied nor sent to a worker.
     """
 
     joint: AnyJoint
     effects: tuple[Effect, ...] = ()
+    stages: tuple[Stage, ...] = ()
     model: Any = field(default=None, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -109,7 +112,10 @@ class JointScene(Scene):
     @property
     def key(self) -> str:
         loads = [plain(effect) for effect in self.effects if not isinstance(effect, StiffnessEffect)]
-        return digest(self.assembly_key, loads)
+        if not self.stages:
+            return digest(self.assembly_key, loads)
+        names = [[effect.name, effect.stage_words] for effect in self.effects]
+        return digest(self.assembly_key, loads, names, [plain(stage) for stage in self.stages])
 
     @property
     def expected_size(self) -> tuple[int, int]:
@@ -220,8 +226,11 @@ def _made(make: Callable[[], ManufacturedProblem]) -> ManufacturedProblem:
 
 
 def plain(table: Table) -> dict[str, Any]:
-    """The table as JSON, for keys. `on_nodes = true` is left out, so that published keys stay valid."""
-    data = table.model_dump(mode="json")
+    """The table as JSON, for keys, without its name.
+
+    `on_nodes = true` is left out, so that published keys stay valid.
+    """
+    data = table.model_dump(mode="json", exclude={"name"})
     if (data.get("pattern") or {}).get("on_nodes"):
         del data["pattern"]["on_nodes"]
     return data

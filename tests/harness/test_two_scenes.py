@@ -11,7 +11,7 @@ from matplotlib.image import imread
 from small_joints import two_parts
 
 from harness.cli.scene import STARTER
-from harness.scene.answer_record import fastener_forces
+from harness.scene.fastener_forces import fastener_forces
 from problems.build import load_case, prepared
 from problems.scene_files import read_scene
 

@@ -30,6 +30,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 PAGE = (DOCS / "effects.md").read_text("utf-8")
 PUBLISHED = "results/published"
 FASTENERS = ("clamps", "fasteners", "installed_fasteners")  # their units are in a table of their own
+COMMON = ("kind", "name")  # of all kinds
 COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
 JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
@@ -79,7 +80,7 @@ def test_the_new_effects_of_the_page_are_short_files(tmp_path: Path, monkeypatch
 @pytest.mark.parametrize("kind", effect_kinds())
 def test_the_table_names_every_parameter_with_its_default_and_unit(kind: str) -> None:
     row = next(line for line in PAGE.splitlines() if line.startswith(f"| `{kind}` |"))
-    fields = {name: field for name, field in effect_class(kind).model_fields.items() if name != "kind"}
+    fields = {name: field for name, field in effect_class(kind).model_fields.items() if name not in COMMON}
     assert set(re.findall(r"`(\w+)", row.split("|", 3)[3])) - {"file"} == fields.keys() - {"file"}
     for name, field in fields.items():
         if isinstance(field.default, float) and field.default:

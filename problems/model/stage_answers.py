@@ -1,0 +1,127 @@
+"""Goes through the stages of a scene: the fasteners that a stage sets lock the approach that it has reached.
+
+    stage s:    min ½xᵀ(K + T diag(k) Tᵀ)x − (f + T(preload + k a))ᵀx    subject to   Aᵀx ≤ g
+
+K, f and g are those of the effects that act in s, and T has a column t per installed fastener. The fasteners
+that s sets lock the elongation a = tᵀx of the answer to everything else that acts in s. From then on they are
+springs. Without a preload they are free of force in s, whose answer is then the same with and without them.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from problems.errors import InputError
+from problems.forms.assembly import Matrix, Vector
+
+from .effect import SpringEffect
+from .scene import JointScene
+from .stages import Acting, Elements, Plan, Stage, acting_effects, of_effect
+
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True)
+class Reached(Generic[Answer]):
+    """A stage with its answer.
+
+    scene : what acts at its end, a scene without stages. approaches : (r, cases) of its springs, mm; see
+    `locked`.
+    """
+
+    stage: Stage
+    scene: JointScene
+    approaches: Matrix
+    answer: Answer
+
+
+def through(
+    scene: JointScene, solve: Callable[[JointScene, Matrix], tuple[Matrix, Answer]], cases: int = 1
+) -> Iterator[Reached[Answer]]:
+    """Go through the stages of a scene, one after another.
+
+    Parameters
+    ----------
+    scene : JointScene
+        With stages.
+    solve : function
+        Answers a scene without stages whose springs have the approaches (r, cases), mm: returns x (n,) or
+        (n, cases) mm, of which fasteners lock their approach, and the answer to hand on.
+    cases : int
+        The number of load cases. Each has approaches of its own.
+
+    Yields
+    ------
+    Reached
+        The stage. It is solved twice if it sets fasteners with a preload, or is the last one and sets some:
+        the second answer counts.
+    """
+    joint, locks = scene.joint, _given(scene, cases)
+
+    def assembled(step: Acting, elements: Elements) -> tuple[JointScene, Matrix]:
+        rows = [at[:, of_effect(number, elements)].reshape(-1, cases) for number, at in locks.items()]
+        return _scene(scene, step, elements), np.concatenate([np.zeros((0, cases)), *rows])
+
+    def answered(step: Acting, part: JointScene, approaches: Matrix) -> tuple[Matrix, Answer]:
+        try:
+            return solve(part, approaches)
+        except InputError as error:
+            raise error.in_stage(step.stage.name) from error
+
+    *_, last = steps = Plan(scene.effects, scene.stages, joint).steps
+    for step in steps:
+        fresh = frozenset((number, k) for number, k in step.fresh if number in locks)
+        part, approaches = assembled(step, step.elements - fresh)
+        x, answer = answered(step, part, approaches)
+        again = step is last
+        for number in sorted({number for number, _ in fresh}):
+            effect, elements = scene.effects[number], of_effect(number, fresh)
+            assert isinstance(effect, SpringEffect)
+            T, _ = effect.springs(joint)
+            reached = (T.T @ x.reshape(-1, cases)).reshape(locks[number].shape)
+            locks[number][:, elements] = reached[:, elements]
+            again = again or effect.preload != 0
+        if fresh:
+            part, approaches = assembled(step, step.elements)
+            _, answer = answered(step, part, approaches) if again else (x, answer)
+        yield Reached(step.stage, part, approaches, answer)
+
+
+def locked(scene: JointScene, approaches: Vector) -> JointScene:
+    """The scene without stages whose springs have the approaches (r,), mm."""
+    effects, start = list(scene.effects), 0
+    for number, effect in enumerate(effects):
+        if isinstance(effect, SpringEffect):
+            stop = start + len(effect.tied(scene.joint)) * effect.element_count(scene.joint)
+            update = {"approach": tuple(approaches[start:stop].tolist())}
+            effects[number], start = effect.model_copy(update=update), stop
+    return replace(scene, effects=tuple(effects))
+
+
+def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
+    """What acts at the end of each stage, by its name: scenes without stages and approaches.
+
+    The scene under "" if it has no stages.
+    """
+    if not scene.stages:
+        return {"": scene}
+    steps = Plan(scene.effects, scene.stages, scene.joint).steps
+    return {step.stage.name: _scene(scene, step, step.elements) for step in steps}
+
+
+def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
+    effects = tuple(acting_effects(scene.effects, elements, scene.joint).values())
+    return replace(scene, title=f"{scene.title}: {step.stage.name}", effects=effects, stages=())
+
+
+def _given(scene: JointScene, cases: int) -> dict[int, Matrix]:
+    """The approaches that the effects give, by the number of the effect: (pairs, elements, cases) mm."""
+    approaches, joint = {}, scene.joint
+    for number, effect in enumerate(scene.effects):
+        if isinstance(effect, SpringEffect):
+            shape = len(effect.tied(joint)), effect.element_count(joint)
+            given = np.broadcast_to(np.array(effect.approach), shape[0] * shape[1])
+            approaches[number] = given.reshape(*shape, 1).repeat(cases, axis=2).astype(float)
+    return approaches

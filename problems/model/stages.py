@@ -1,0 +1,165 @@
+"""The stages of an assembly: tables [[stage]] that set effects and take them out, and what acts in each.
+
+    [[stage]]
+    name = "rivet"
+    on = ["rivets[0:8]", "shims"]         # names of effects; [a:b] some of the elements of one at points
+    off = ["clamps"]
+
+An effect that no stage names acts throughout. A file of points may have a column `stage`, the name of the
+stage that sets the point.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from problems.input.bounded_types import Name, unknown
+
+from .effect import Effect, SpringEffect
+from .interface import AnyJoint
+from .joint import Faults, Table
+
+SLICE = re.compile(r"(.+?)\s*\[\s*(\d*)\s*:\s*(\d*)\s*\]")
+#: Elements of effects: the number of the effect, and of the element. An effect without elements has one.
+Elements = frozenset[tuple[int, int]]
+
+
+class Stage(Table):
+    """A [[stage]] table: the names of the effects that it sets (`on`) and takes out (`off`)."""
+
+    name: Name
+    on: tuple[str, ...] = ()
+    off: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Acting:
+    """What acts in a stage. fresh : what the stage sets."""
+
+    stage: Stage
+    elements: Elements
+    fresh: Elements
+
+
+def of_effect(number: int, elements: Elements) -> list[int]:
+    """The numbers of the elements of an effect, ascending."""
+    return sorted(k for i, k in elements if i == number)
+
+
+def acting_effects(effects: Sequence[Effect], elements: Elements, joint: AnyJoint) -> dict[int, Effect]:
+    """The effects of some elements, by their numbers."""
+    numbers = sorted({number for number, _ in elements})
+    return {number: effects[number].only(of_effect(number, elements), joint) for number in numbers}
+
+
+@dataclass
+class Plan:
+    """What acts in each stage, as far as the names in the stages are right; `wrong` says which are not.
+
+    effects, stages : those of a scene. joint : its joint.
+    """
+
+    effects: Sequence[Effect]
+    stages: Sequence[Stage]
+    joint: AnyJoint
+    wrong: list[tuple[str, object, str]] = field(default_factory=list)
+    steps: list[Acting] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.counts = [effect.element_count(self.joint) for effect in self.effects]
+        taken = [self._named(k, "off", stage.off) for k, stage in enumerate(self.stages)]
+        put = [
+            self._named(k, "on", stage.on) | self._of_files(stage.name) for k, stage in enumerate(self.stages)
+        ]
+        self.staged = {element for sets in (*taken, *put) for some in sets.values() for element in some}
+        acting = self.everything - self.staged
+        for number, (stage, off, on) in enumerate(zip(self.stages, taken, put, strict=True)):
+            fresh: Elements = frozenset()
+            for reference, elements in off.items():
+                if not elements <= acting:
+                    self._fault(number, "off", reference, "what acts: this is taken out before it is set")
+                acting -= elements
+            for reference, elements in on.items():
+                if elements & acting:
+                    self._fault(number, "on", reference, "what does not act yet: this is set twice")
+                acting, fresh = acting | elements, fresh | elements
+            self.steps.append(Acting(stage, acting, fresh))
+
+    @property
+    def everything(self) -> Elements:
+        """The elements of all effects."""
+        counts = enumerate(self.counts)
+        return frozenset((number, k) for number, count in counts for k in range(max(count, 1)))
+
+    def _fault(self, number: int, key: str, value: str, allowed: str) -> None:
+        self.wrong.append((f"stage[{number}] ({self.stages[number].name}).{key}", value, allowed))
+
+    def _of_files(self, stage: str) -> dict[str, Elements]:
+        """The elements whose row in a file names the stage, by the name or kind of the effect."""
+        return {
+            f"column stage of {effect.name or effect.kind}": frozenset(
+                (number, k) for k, word in enumerate(effect.stage_words) if word == stage
+            )
+            for number, effect in enumerate(self.effects)
+        }
+
+    def _named(self, number: int, key: str, references: Sequence[str]) -> dict[str, Elements]:
+        """The elements of each entry of a stage that is right."""
+        names = {effect.name: k for k, effect in enumerate(self.effects) if effect.name is not None}
+        sets: dict[str, Elements] = {}
+        for reference in references:
+            match = None if reference in names else SLICE.fullmatch(reference)
+            name = match[1] if match else reference
+            if name not in names:
+                allowed = (
+                    unknown("effect", name, list(names)) if names else 'an effect with name = "…"; none has'
+                )
+                self._fault(number, key, reference, allowed)
+                continue
+            effect, count = names[name], self.counts[names[name]]
+            start, stop = (int(match[2] or 0), int(match[3] or count)) if match else (0, max(count, 1))
+            if match and not start < stop <= count:
+                has = f"0 <= a < b <= {count}, its points" if count else "no [a:b]: it has no points"
+                self._fault(number, key, reference, f"{name} with {has}")
+            else:
+                sets[reference] = frozenset((effect, k) for k in range(start, stop))
+        return sets
+
+    def faults(self) -> Faults:
+        """Yield what is wrong with the stages: key, value, what is allowed."""
+        for where, tables in (("effect", self.effects), ("stage", self.stages)):
+            names = [table.name for table in tables]
+            for number, name in enumerate(names):
+                if name is not None and name in names[:number]:
+                    allowed = f"a name of its own: {where}[{names.index(name)}] has it"
+                    yield f"{where}[{number}].name", name, allowed
+        yield from self.wrong
+        for number, effect in enumerate(self.effects):
+            where = f"effect[{number}] ({effect.kind})"
+            setting = [step.stage.name for step in self.steps if of_effect(number, step.fresh)]
+            if setting and effect.contacts:
+                allowed = f"one that no stage names: a {effect.kind} makes a contact, which stays"
+                yield f"{where}.name", effect.name, allowed
+            if setting and isinstance(effect, SpringEffect) and "approach" in effect.model_fields_set:
+                allowed = f"left out: stage {setting[0]} locks the approach that it has reached"
+                yield f"{where}.approach", effect.approach, allowed
+            never = [k for k in range(self.counts[number]) if (number, k) not in self.staged]
+            if setting and never:
+                allowed = f"all of its {self.counts[number]} points in stages, or none: {never[0]} is in none"
+                yield f"{where}.name", effect.name, allowed
+        if not self.wrong:
+            yield from self._clashes()
+
+    def _clashes(self) -> Faults:
+        """Yield the faults of effects that act together."""
+        told = [fault for effect in self.effects for fault in effect.faults(self.joint)]
+        for step in self.steps:
+            acting = acting_effects(self.effects, step.elements, self.joint)
+            for number, effect in acting.items():
+                others = [other for k, other in acting.items() if k != number]
+                for fault in effect.faults(self.joint, others):
+                    if fault not in told:
+                        told.append(fault)
+                        key, value, allowed = fault
+                        where = f"effect[{number}] ({effect.kind}).{key}"
+                        yield where, value, f"{allowed}, in stage {step.stage.name}"

@@ -1,0 +1,310 @@
+"""Stages against closed forms, against scenes made by hand, and against each other; and bad stages."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_joints import untied
+from superelements import stiffnesses, write_part
+
+from harness.scene.fastener_forces import fastener_forces
+from harness.scene.solution import Solution, solve
+from problems.build import load_case, prepared, shares_stiffness
+from problems.errors import InputError
+from problems.forms import Form
+from problems.forms.assembly import Matrix
+from problems.model.scene import JointScene
+from problems.model.stage_answers import locked, stage_scenes, through
+from problems.scene_files import read_scene, scene_of
+
+Tables = dict[str, Any]
+LENGTH, THICKNESS, WIDTH, YOUNG = 200.0, 4.0, 10.0, 70e3
+#: Relative deflection of the middles of two built-in strips per force between them, mm/N.
+C = 2 * LENGTH**3 / (192 * YOUNG * WIDTH * THICKNESS**3 / 12)
+FORCE, STIFFNESS = 30.0, 900.0
+
+
+def strips(**rivets: Any) -> JointScene:
+    """Two strips built in at both ends, pressed together at the middle; a rivet between the forces."""
+    ends = {"length": (LENGTH - 20) / 2, "elements": 3}
+    strip = {"thickness": THICKNESS, "young": YOUNG, "poisson": 0.0, "clamped": ["south", "north"]}
+    parts = [strip | {"name": name, "south": ends, "north": ends} for name in "ab"]
+    junction = {"length": WIDTH, "width": 20.0, "nodes": [2, 3]}
+    forces = {"points": [[0.0, 10.0], [WIDTH, 10.0]], "preload": FORCE / 2}
+    rivet = {"points": [[WIDTH / 2, 10.0]], "stiffness": STIFFNESS}
+    effects = [
+        {"kind": "initial_gap", "mean": 50.0},
+        {"kind": "fasteners", "name": "tacks"} | forces,
+        {"kind": "installed_fasteners", "name": "rivets"} | rivet | rivets,
+    ]
+    stages = [
+        {"name": "tack", "on": ["tacks"]},
+        {"name": "rivet", "on": ["rivets"]},
+        {"name": "release", "off": ["tacks"]},
+    ]
+    return joint_scene({"joint": {"junction": junction, "part": parts}, "effect": effects, "stage": stages})
+
+
+def joint_scene(table: Tables) -> JointScene:
+    scene = scene_of(table)
+    assert isinstance(scene, JointScene)
+    return scene
+
+
+def approach(answer: Solution, stage: int) -> float:
+    """By how much the gaps at the middle of the strips have been closed, on average."""
+    return float((50.0 - answer.stages[stage].gap[2:4]).mean())
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+@pytest.mark.parametrize("preload", [0.0, 25.0])
+def test_spring_back_of_a_strip(form: Form, preload: float) -> None:
+    """w₁ = Pc; after the release the rivet carries k (w₁ − w₂) + R = w₂ / c.
+
+    The width of the strips bends between the two forces, too: c is 1.4e-4 above that of a beam.
+    """
+    answer = solve(strips(preload=preload), form=form)
+    first = answer.stages[0].forces["fasteners"] * C
+    assert approach(answer, 0) == pytest.approx(first, rel=2e-4)
+    first = approach(answer, 0)
+    c = first / FORCE
+    springs_back = (first * STIFFNESS + preload) * c / (1 + STIFFNESS * c)
+    set_there = first + preload * c / (1 + STIFFNESS * c)
+    found = [approach(answer, stage) for stage in (1, 2)]
+    np.testing.assert_allclose(found, [set_there, springs_back], rtol=1e-9)
+    *_, last = answer.stages
+    assert last.forces["installed_fasteners"] == pytest.approx(springs_back / c, rel=1e-7)
+    assert [stage.judgement.verdict for stage in answer.stages] == ["within"] * 3
+
+
+PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"], "thickness": 3.0}
+JOINT = {
+    "junction": {"length": 400.0, "width": 120.0, "nodes": [9, 5]},
+    "part": [PART | {"name": "a"}, PART | {"name": "b", "thickness": 4.0}],
+}
+RIVETS = [[60.0, 20.0], [140.0, 30.0], [210.0, 20.0], [340.0, 33.0]]
+CLAMPS = {
+    "kind": "clamps",
+    "name": "clamps",
+    "clamping_force": 90.0,
+    "points": [[100.0, 40.0], [270.0, 40.0]],
+}
+EFFECTS: list[Tables] = [
+    {"kind": "initial_gap", "mean": 0.5, "random": {"sd": 0.2, "correlation_length": 90.0, "seed": 3}},
+    CLAMPS,
+    {"kind": "installed_fasteners", "name": "rivets", "stiffness": 2e4, "points": RIVETS},
+    {"kind": "pressure", "part": "a", "value": 2e-4},
+]
+
+
+def joined(stages: list[Tables], effects: list[Tables] = EFFECTS, joint: Tables = JOINT) -> JointScene:
+    return joint_scene({"joint": joint, "effect": effects, "stage": stages})
+
+
+CLAMP, RELEASE = {"name": "clamp", "on": ["clamps"]}, {"name": "release", "off": ["clamps"]}
+ONCE = [CLAMP, {"name": "rivet", "on": ["rivets"]}, RELEASE]
+
+
+def test_a_clamp_that_comes_and_goes_changes_nothing() -> None:
+    plain = [effect for effect in EFFECTS if effect["kind"] not in ("clamps", "installed_fasteners")]
+    answer = solve(joined([CLAMP, RELEASE, CLAMP | {"name": "2"}, RELEASE | {"name": "3"}], [*plain, CLAMPS]))
+    alone = solve(joined([], plain))
+    assert alone.stages == ()
+    assert abs(answer.x - alone.x).max() <= 1e-12
+    assert answer.stages[0].gap.min() >= -1e-12
+    assert abs(answer.stages[0].x - alone.x).max() > 0.01
+    np.testing.assert_array_equal(answer.stages[0].x, answer.stages[2].x)
+
+
+def test_the_order_of_rivets_matters_only_if_something_acts_between() -> None:
+    some: list[Tables] = [
+        {"name": "1", "on": ["rivets[2:]", "rivets[0:1]"]},
+        {"name": "2", "on": ["rivets[1:2]"]},
+    ]
+    together, apart = solve(joined(ONCE)), solve(joined([CLAMP, *some, RELEASE]))
+    assert abs(together.x - apart.x).max() <= 1e-10
+    between = solve(joined([CLAMP, some[0], RELEASE, some[1]]))
+    assert abs(together.x - between.x).max() > 1e-3
+
+
+def test_by_hand_and_stage_by_stage() -> None:
+    """Three scenes, the approaches of the second written into the third; and each stage solved alone."""
+    answer = solve(joined(ONCE))
+    clamped = solve(joined([], EFFECTS[:2] + EFFECTS[3:]))
+    (rivets,) = [effect for effect in answer.stages[-1].scene.effects if effect.kind == "installed_fasteners"]
+    W = clamped.problem.scene.joint.weights(np.array(RIVETS))  # type: ignore[attr-defined]
+    a, b = clamped.x.reshape(2, -1)
+    reached = W @ (a - b)
+    by_hand = solve(joined([], [EFFECTS[0], EFFECTS[3], EFFECTS[2] | {"approach": reached.tolist()}]))
+    assert abs(by_hand.x - answer.x).max() <= 1e-10
+    assert rivets.approach == pytest.approx(reached.tolist(), abs=1e-12)  # type: ignore[attr-defined]
+    for stage in answer.stages:
+        alone = solve(stage.scene)
+        assert abs(alone.x - stage.x).max() <= 1e-10
+        assert alone.stages == ()
+
+
+def test_each_part_is_in_equilibrium_in_each_stage() -> None:
+    """K of the parts alone takes all forces: those of effects, of springs and of contacts."""
+    rivets = EFFECTS[2] | {"preload": 15.0}
+    for stage in solve(joined(ONCE, [*EFFECTS[:2], rivets, EFFECTS[3]])).stages:
+        scene = untied(stage.scene)
+        K = prepared(scene).assembly.K
+        taken = load_case(scene).f - scene.joint.contact_matrix() @ stage.lam
+        forces = [one["force_N"] for one in fastener_forces(stage.scene, stage.x)]
+        for effect in stage.scene.effects:
+            if effect.kind == "installed_fasteners":
+                T, _ = effect.springs(scene.joint)  # type: ignore[attr-defined]
+                taken += T @ forces[-T.shape[1] :]
+        assert abs(K.multiply(stage.x) - taken).max() <= 1e-8
+        assert stage.forces["contacts"] == pytest.approx(stage.lam.sum())
+
+
+def test_superelements_go_through_the_same_stages(tmp_path: Path) -> None:
+    plates = joined(ONCE)
+    nodes = np.column_stack([plates.joint.nodes_of("a"), np.zeros(45)])
+    matrices = stiffnesses(plates.joint)  # type: ignore[arg-type]
+    parts = [write_part(tmp_path, name, K, nodes) for name, K in zip("ab", matrices, strict=True)]
+    effects = [{"kind": "initial_gap", "mean": 0.4}, *EFFECTS[1:3]]
+    one, other = solve(joined(ONCE, effects)), solve(joined(ONCE, effects, {"part": parts}))
+    for mine, theirs in zip(one.stages, other.stages, strict=True):
+        assert abs(mine.x - theirs.x).max() <= 1e-8
+
+
+def test_many_cases_go_through_at_once() -> None:
+    """Each load case locks approaches of its own."""
+    scene = joined(
+        [CLAMP, {"name": "1", "on": ["rivets[0:2]"]}, RELEASE, {"name": "2", "on": ["rivets[2:4]"]}]
+    )
+
+    def solved(part: JointScene, approaches: Matrix) -> tuple[Matrix, int]:
+        answers = [solve(heavier(locked(part, column), k)).x for k, column in enumerate(approaches.T)]
+        return np.column_stack(answers), approaches.shape[1]
+
+    def heavier(part: JointScene, k: int) -> JointScene:
+        gap = part.effects[0].model_copy(update={"mean": 0.5 + 0.1 * k})
+        return replace(part, effects=(gap, *part.effects[1:]))
+
+    *_, both = through(scene, solved, 2)
+    for k in range(2):
+        *_, one = through(heavier(scene, k), lambda part, at: (solve(locked(part, at[:, 0])).x, 0))
+        np.testing.assert_allclose(both.approaches[:, k], one.approaches[:, 0], atol=1e-10)
+    assert abs(np.diff(both.approaches)).max() > 0.01
+
+
+def test_stages_share_the_stiffness_that_they_have_in_common() -> None:
+    scenes = [*stage_scenes(joined([CLAMP, {"name": "drill"}, *ONCE[1:]])).values()]
+    assert [shares_stiffness(scene, scenes[0]) for scene in scenes] == [True, True, False, False]
+    assert scenes[1].model is not None
+    with pytest.raises(InputError, match="no stages here"):
+        prepared(joined(ONCE))
+
+
+def test_springs_have_a_key_of_their_own_in_the_sparse_form() -> None:
+    """What was proven of K without springs does not hold with them."""
+    scene = joined([])
+    assert prepared(scene, form="sparse").key != prepared(untied(scene), form="sparse").key
+
+
+def test_a_name_is_in_no_key_and_stages_are() -> None:
+    named = {key: value for key, value in EFFECTS[2].items() if key != "name"}
+    bare = joined([], [EFFECTS[0], named])
+    assert joined([], [EFFECTS[0], EFFECTS[2]]).key == bare.key
+    keys = {joined(stages).key for stages in ([], ONCE, [*ONCE, {"name": "drill"}])}
+    assert len(keys) == 3
+
+
+def test_the_stage_of_a_point_may_stand_in_its_file(tmp_path: Path) -> None:
+    rows = zip(RIVETS, ["first", "second", "first", "second"], strict=True)
+    (tmp_path / "rivets.csv").write_text(
+        "x,y,stage\n" + "".join(f"{x},{y},{stage}\n" for (x, y), stage in rows)
+    )
+    from_file = {key: value for key, value in EFFECTS[2].items() if key != "points"}
+    from_file["file"] = str(tmp_path / "rivets.csv")
+    effects = [*EFFECTS[:2], from_file, EFFECTS[3]]
+    stages = [CLAMP, {"name": "first"}, RELEASE, {"name": "second"}]
+    listed = [CLAMP, {"name": "first", "on": ["rivets[0:1]", "rivets[2:3]"]}, RELEASE]
+    listed += [{"name": "second", "on": ["rivets[1:2]", "rivets[3:4]"]}]
+    one, other = stage_scenes(joined(stages, effects)), stage_scenes(joined(listed))
+    assert [scene.key for scene in one.values()] == [scene.key for scene in other.values()]
+    with pytest.raises(InputError, match=r"line 3 = 'second': no such stage.*allowed: clamp, first"):
+        joined(stages[:2], effects)
+
+
+SUPPORTS = [[0.0, 10.0], [400.0, 10.0], [200.0, 200.0]]
+BAD: list[tuple[list[Tables], Tables, str, str]] = [
+    ([{"name": "1", "on": ["clamp"]}], {}, "stage[0] (1).on = 'clamp'", "did you mean clamps?"),
+    ([CLAMP, {"name": "2", "on": ["clamps[0:1]"]}], {}, "stage[1] (2).on = 'clamps[0:1]'", "set twice"),
+    ([RELEASE], {}, "stage[0] (release).off = 'clamps'", "before it is set"),
+    ([{"name": "1", "on": ["rivets[2:9]"]}], {}, "'rivets[2:9]'", "0 <= a < b <= 4"),
+    ([{"name": "1", "on": ["tool[0:1]"]}], {}, "'tool[0:1]'", "it has no points"),
+    ([CLAMP, {"name": "clamp"}], {}, "stage[1].name = 'clamp'", "stage[0] has it"),
+    ([{"on": ["clamps"]}], {}, "stage[0].name", "required"),
+    ([CLAMP | {"of": []}], {}, "stage[0].of", "did you mean off?"),
+    (
+        [{"name": "1", "on": ["rivets"]}],
+        {"approach": 0.1},
+        "effect[2] (installed_fasteners).approach",
+        "left out",
+    ),
+    ([{"name": "1", "on": ["tool"]}], {}, "effect[4] (rigid_tool).name = 'tool'", "makes a contact"),
+    (
+        [{"name": "1", "on": ["rivets[0:3]"]}],
+        {},
+        "effect[2] (installed_fasteners).name",
+        "or none: 3 is in none",
+    ),
+    ([CLAMP], {"name": "clamps"}, "effect[2].name = 'clamps'", "effect[1] has it"),
+    ([CLAMP], {"points": [[100.0, 40.0]]}, "effect[2] (installed_fasteners).points", "in stage clamp"),
+    ([CLAMP], {"approach": [0.1, 0.2]}, "approach", "one for each of 4 springs"),
+    ([CLAMP], {"preload": -1.0}, "preload", "in N"),
+    (
+        [{"name": "hold", "on": ["legs"]}, {"name": "let go", "off": ["legs[0:2]"]}],
+        {},
+        "part.b = [(200.0, 200.0)]",
+        "in stage let go: it tilts about a point",
+    ),
+]
+
+
+@pytest.mark.parametrize(("stages", "rivets", "where", "allowed"), BAD)
+def test_bad_stages(stages: list[Tables], rivets: Tables, where: str, allowed: str) -> None:
+    tool = {"kind": "rigid_tool", "name": "tool", "part": "b", "distance": 5.0}
+    legs = {"kind": "supports", "name": "legs", "part": "b", "points": SUPPORTS}
+    legged = PART | {"name": "b", "clamped": []}
+    joint = JOINT | {"part": [PART | {"name": "a"}, legged]}
+    effects = [*EFFECTS[:2], EFFECTS[2] | rivets, EFFECTS[3], tool, legs]
+    with pytest.raises(InputError) as error:
+        joined(stages, effects, joint)
+    (line,) = str(error.value).split("\n")
+    assert where in line
+    assert allowed in line
+
+
+def test_all_bad_stages_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text("stage = 3\n[joint]\njunction = { length = 9.0, width = 9.0, nodes = [2, 2] }\n")
+    with pytest.raises(InputError, match="stage = 3: tables"):
+        read_scene(str(path))
+    bad = [{"name": "1", "on": ["clamp", "rivets[9:]"]}, {"name": "2", "off": ["clamps"]}]
+    with pytest.raises(InputError) as error:
+        joined(bad)
+    assert len(error.value.faults) == 3
+
+
+def test_a_superelement_that_a_stage_leaves_free_is_named_with_the_stage(tmp_path: Path) -> None:
+    plates = joined([])
+    K, nodes = stiffnesses(plates.joint), plates.joint.nodes_of("a")  # type: ignore[arg-type]
+    free = np.column_stack([np.ones(45), nodes])
+    Q, _ = np.linalg.qr(free)
+    P = np.eye(45) - Q @ Q.T
+    xyz = np.column_stack([nodes, np.zeros(45)])
+    parts = [write_part(tmp_path, "a", K[0], xyz), write_part(tmp_path, "b", P @ K[1] @ P, xyz)]
+    holds = EFFECTS[2] | {"name": "holds", "points": [[10.0, 90.0], [390.0, 90.0], [200.0, 110.0]]}
+    stages = [{"name": "hold", "on": ["holds"]}, {"name": "let go", "off": ["holds"]}]
+    with pytest.raises(
+        InputError, match=r"part\.b, in stage let go = 'translation along z.*no free rigid motion"
+    ):
+        solve(joined(stages, [EFFECTS[0], holds], {"part": parts}))
