@@ -62,8 +62,10 @@ def model_of(scene: Scene) -> Model:
     return model
 
 
-def models_of(scene: JointScene) -> list[Model]:
+def models_of(scene: Scene) -> list[Model]:
     """The model of each stage, or of the scene if it has none. Raises InputError, which names the stages."""
+    if not isinstance(scene, JointScene):
+        return [model_of(scene)]
     models, faults = [], []
     for name, part in stage_scenes(scene).items():
         try:
@@ -140,6 +142,17 @@ class GivenModel:
     def built(self) -> bool:
         """Whether the dense factors and Q are in the cache."""
         return self.dense().built
+
+    @property
+    def stored_sparse(self) -> Assembly | None:
+        """The assembly with sparse blocks, if a large K is given so."""
+        from problems.input import user_matrices  # slow to import
+
+        if isinstance(scene := self.scene, ManufacturedScene):
+            given = scene.sparse and sum(scene.block_sizes) > user_matrices.SMALL
+        else:
+            given = user_matrices.holds_sparse(dict(scene.files))
+        return self._read(sparse=True)[0] if given else None
 
     def _checked(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
         """As `_read`. Raises InputError if contacts of a rung are dependent; a user's A was checked."""

@@ -24,6 +24,7 @@ SUPERELEMENTS = "superelements"
 KINDS = (*map(str, SIZES), SUPERELEMENTS)
 EXAMPLES = [f"drawn/{kind}/0" for kind in KINDS]
 NAME = re.compile(rf"(drawn/({'|'.join(KINDS)})/)(0|[1-9][0-9]{{0,4}})")
+SUPERELEMENT_NAME = re.compile(rf"drawn/{SUPERELEMENTS}/(0|[1-9][0-9]{{0,4}})")
 RANGE = re.compile(rf"{NAME.pattern}\.\.([0-9]{{1,5}})")
 
 

@@ -31,7 +31,7 @@ from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.model.stages import Plan, Stage, acting_effects
-from problems.random_scenes import EXAMPLES, drawn_names, drawn_table
+from problems.random_scenes import EXAMPLES, SUPERELEMENT_NAME, drawn_table
 
 from .errors import BACKSLASH, Fault, InputError
 
@@ -60,12 +60,12 @@ def read_scene(name_or_path: str) -> Scene:
         if name_or_path not in (known := rung_names(prefix)):
             raise _unknown_scene(name_or_path, known)
         return make_rung(name_or_path)
-    if table := drawn_table(name_or_path):
-        return _scene(name_or_path, SCENES / name_or_path, table)
-    if drawn_names(name_or_path) == [name_or_path]:
+    if SUPERELEMENT_NAME.fullmatch(name_or_path):
         from problems.random_superelements import drawn_joint
 
         return drawn_joint(name_or_path)
+    if table := drawn_table(name_or_path):
+        return _scene(name_or_path, SCENES / name_or_path, table)
     path = Path(name_or_path)
     if path.suffix == ".npz":
         if not path.is_file():

@@ -9,17 +9,17 @@ are small for the number of load cases that share them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log2
 
 from harness.results.provenance import physical_memory_mib
 from problems.build import models_of
 from problems.errors import InputError
 from problems.forms import DENSE_FORMS, Form, default_form
-from problems.input.user_matrices import SMALL, holds_sparse, stored_matrices
+from problems.forms.assembly import Assembly
 from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
-from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
+from problems.model.scene import JointScene, Scene
 from problems.stiffness.dense_block import dense_slices
 
 SMALL_MIB = 100.0  # of dense matrices, per load case
@@ -37,7 +37,8 @@ FACTORS = 2  # of K̂ at a time: to solve with, and to prove λmin
 class Size:
     """n unknowns, m contacts; MiB of the stored matrices, and of the process at its peak, in either form.
 
-    unknowns, half_bandwidth : of the finite-element model, without a condensation.
+    unknowns, half_bandwidth : of the finite-element model, without a condensation. stored : whether the cache
+    has the dense matrices of the joint and they fit into memory.
     """
 
     n: int
@@ -48,6 +49,7 @@ class Size:
     sparse_peak_mib: float
     unknowns: int
     half_bandwidth: int | None = None
+    stored: bool = False
 
     def peak_mib(self, form: Form) -> float:
         return self.dense_peak_mib if form in DENSE_FORMS else self.sparse_peak_mib
@@ -55,29 +57,24 @@ class Size:
 
 def size_of(scene: Scene) -> Size | None:
     """The size of a joint of plates or of sparse matrices; None for dense arrays, already in memory."""
-    match scene:
-        case JointScene(joint=Joint() as joint):
-            return _of_joint(scene, joint)
-        case JointScene() if _holds_sparse(scene):
-            assembly = models_of(scene)[-1].sparse().assembly
-        case ManufacturedScene() if scene.sparse and sum(scene.block_sizes) > SMALL:
-            assembly = scene.made.assembly
-        case MatricesScene() if holds_sparse(files := dict(scene.files)):
-            assembly = stored_matrices(files, scene.assembly_key, sparse=True)[0]
-        case _:
-            return None
+    models = models_of(scene)
+    if isinstance(scene, JointScene) and isinstance(scene.joint, Joint):
+        size = _of_joint(scene, scene.joint)
+    elif (assembly := models[-1].stored_sparse) is not None:
+        size = _of_given(assembly)
+    else:
+        return None
+    usable = isinstance(scene, JointScene) and size.dense_peak_mib <= physical_memory_mib()
+    return replace(size, stored=usable and all(model.built for model in models))
+
+
+def _of_given(assembly: Assembly) -> Size:
+    """The size of sparse matrices, from the number of entries of the factors of K."""
     K = assembly.K.matrix
     blocks = [rows.stop - rows.start for rows in dense_slices(K)]
     sparse = 8 * assembly.K.factor_nonzeros / MIB
     peak = PROCESS_MIB + FACTORS * sparse + BYTES_PER_ENTRY * K.nnz / MIB
     return Size(assembly.n, assembly.m, *_dense(blocks, assembly.m), sparse, peak, assembly.n)
-
-
-def _holds_sparse(scene: JointScene) -> bool:
-    from problems.model.superelement_model import SuperelementModel  # of superelements only
-
-    model = models_of(scene)[-1]
-    return isinstance(model, SuperelementModel) and model.holds_sparse
 
 
 def _dense(blocks: Sequence[int], m: int) -> tuple[float, float]:
@@ -138,17 +135,16 @@ def chosen_form(scene: Scene, taken: Sequence[Form], form: Form | None, cases: i
     if form is not None and form not in taken:
         raise InputError.one("--form", "form", form, f"the solver takes {' and '.join(taken)}")
     size = size_of(scene)
-    choice = _by_rule(scene, size, taken, cases) if form is None else Choice(form)
+    choice = _by_rule(size, taken, cases) if form is None else Choice(form)
     refuse_what_cannot_fit(scene, size, choice.form)
     return choice
 
 
-def _by_rule(scene: Scene, size: Size | None, taken: Sequence[Form], cases: int) -> Choice:
+def _by_rule(size: Size | None, taken: Sequence[Form], cases: int) -> Choice:
     dense = [form for form in taken if form in DENSE_FORMS]
     if not dense or "sparse" not in taken or size is None:
         return Choice(default_form(dense or taken))
     fits = size.dense_peak_mib <= physical_memory_mib()
-    cached = isinstance(scene, JointScene) and all(model.built for model in models_of(scene))
-    if fits and (cached or size.dense_mib <= SMALL_MIB * cases):
+    if fits and (size.stored or size.dense_mib <= SMALL_MIB * cases):
         return Choice(default_form(dense))
     return Choice("sparse", f"dense matrices would take {size.dense_mib:.0f} MiB")

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from harness.results.records import replace_text, to_line
 from problems.errors import InputError
@@ -19,9 +18,10 @@ RECORD = "solution.json"  # of an answer
 def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     """A path beside `out` to write a file or a folder to; at the end of the block it moves to `out`.
 
-    Files of the same names are replaced, and those that an older answer left (see `write_record`) removed;
-    whatever the block raises, nothing has changed. Raises InputError if `out` is no regular file or folder,
-    is of the other kind, is one of the inputs, or cannot be written. The block only writes.
+    Files of the same names are replaced, and those that an older answer left removed: a record solution.json
+    gets the names of all files beside it. Whatever the block raises, nothing has changed. Raises InputError
+    if `out` is no regular file or folder, is of the other kind, is one of the inputs, or cannot be written.
+    The block only writes.
     """
     refuse_unwritable(out, inputs)
     try:
@@ -36,6 +36,7 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
                     "--out", "path", str(out), f"a {kind} is to be written, and this is none"
                 )
             if new.is_dir():
+                _record_files(new / RECORD)
                 refuse_inputs([*(out / path.name for path in new.iterdir()), *_listed(target)], inputs)
                 target.mkdir(exist_ok=True)
                 for path in _listed(target):
@@ -48,10 +49,11 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
         raise _unwritable("--out", out, error.strerror or str(error)) from error
 
 
-def write_record(folder: Path, record: dict[str, Any]) -> None:
-    """Write folder/solution.json, with the names of all files there under `files`."""
-    names = sorted({RECORD, *(each.name for each in folder.iterdir())})
-    replace_text(folder / RECORD, to_line(record | {"files": names}) + "\n")
+def _record_files(record: Path) -> None:
+    """Put the names of all files beside an answer's record into it, under `files`."""
+    if record.exists():
+        names = sorted(path.name for path in record.parent.iterdir())
+        replace_text(record, to_line(json.loads(record.read_text("utf-8")) | {"files": names}) + "\n")
 
 
 def _listed(folder: Path) -> set[Path]:

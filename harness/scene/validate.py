@@ -16,7 +16,7 @@ from harness.terminal.docstrings import docstring
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import about, expected_error
-from problems.build import models_of, prepared, shares_stiffness
+from problems.build import prepared, shares_stiffness
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
@@ -78,8 +78,7 @@ def _plates(scene: JointScene, size: Size, console: Console) -> None:
     console.print(_contents(scene))
     contacts = counted(size.m, "contact")
     console.print(f"n = {size.n} unknowns, m = {contacts}; this machine has {physical} MiB.")
-    built = all(model.built for model in models_of(scene))
-    cached = "; the assembly is in the cache" if built else ""
+    cached = "; the assembly is in the cache" if size.stored else ""
     console.print(
         f"Dense forms: K, its factors and Q take {size.dense_mib:.0f} MiB{cached}, the process up to "
         f"{size.dense_peak_mib:.0f} MiB."

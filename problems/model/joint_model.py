@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,6 +44,7 @@ class JointModel:
     joint: Joint
     parts: tuple[PartModel, ...]
     interiors: dict[int, tuple[Indices, SparseBlock]] = field(default_factory=dict, repr=False)
+    stored_sparse: ClassVar[None] = None  # no K is given
 
     @classmethod
     def of(cls, scene: JointScene) -> "JointModel":

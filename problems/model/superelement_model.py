@@ -62,10 +62,10 @@ class SuperelementModel:
         return Springs.of(self.scene)
 
     @property
-    def holds_sparse(self) -> bool:
-        """Whether every large K is stored as a sparse matrix, and there is one."""
+    def stored_sparse(self) -> Assembly | None:
+        """The sparse assembly, if every large K is stored as a sparse matrix and there is one."""
         large = [part.sparse for part in self.joint.parts if part.size > SMALL]
-        return bool(large) and all(large)
+        return self.sparse().assembly if large and all(large) else None
 
     def sparse(self) -> SparsePrepared:
         """K and A as sparse matrices. Raises InputError if a large K is dense."""
