@@ -176,14 +176,15 @@ def _of_stages(
     """Yield the faults of the stages, and of a part that is held in none, or not in a stage."""
     plan = Plan(effects, stages, joint)
     yield from (Fault(str(path), *fault) for fault in plan.faults())
-    steps = [(f" in stage {step.stage.name}", step.elements) for step in plan.steps]
+    if not isinstance(joint, Joint) or plan.wrong:
+        return
     told: set[str] = set()
-    for where, elements in [*steps, *([] if steps else [("", plan.everything)])]:
-        if isinstance(joint, Joint) and not plan.wrong:
-            acting = tuple(acting_effects(effects, elements, joint).values())
-            for fault in _floating(joint_path, joint, acting, where):
-                yield from () if fault.key in told else (fault,)
-                told.add(fault.key)
+    for step in plan.steps:
+        acting = tuple(acting_effects(effects, step.elements, joint).values())
+        where = f" in stage {step.name}" if step.name else ""
+        for fault in _floating(joint_path, joint, acting, where):
+            yield from () if fault.key in told else (fault,)
+            told.add(fault.key)
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:

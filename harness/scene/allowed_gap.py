@@ -8,6 +8,7 @@ stores gaps as float32, whose rounding, 6e-8 of the gap, is added to e.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -17,7 +18,6 @@ import numpy as np
 
 from harness.results import series_file
 from harness.results.records import to_line
-from harness.verification.assess import GapError
 from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
 from problems.model.effect import GapEffect
@@ -26,6 +26,7 @@ from report.document.numbers import counted, position
 
 from .mesh_error import MeshError
 from .solution import Solution
+from .stages import StageAnswer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,14 +58,17 @@ def check_answer(
     solution: Solution, allowed_mm: float, pairs: list[dict[str, Any]], mesh: MeshError | None
 ) -> dict[str, Any]:
     """The entry `allowed_gap` of solution.json. pairs : the contacts of each pair, by start and stop."""
-    problem = solution.problem
-    error = GapError.of(problem.prepared.assembly)
-    e = error(problem.load.g, solution.unknowns, solution.error_bound_mm)
-    check = checked(allowed_mm, solution.gap, e, pairs)
+    check = checked(allowed_mm, solution.gap, solution.gap_error_mm, pairs)
     if mesh is not None and abs(check["largest_mm"] - allowed_mm) <= mesh.error_mm:
         check["closer_than_grid_mm"] = mesh.error_mm
-    beyond = _beyond_scan(problem.scene, check["contacts"])
+    beyond = _beyond_scan(solution.problem.scene, check["contacts"])
     return check | ({"beyond_scan": beyond} if beyond else {})
+
+
+def check_stages(stages: Sequence[StageAnswer], allowed_mm: float, records: list[dict[str, Any]]) -> None:
+    """Put into the record of each stage whether a gap is larger than allowed, None if it cannot be told."""
+    for stage, record in zip(stages, records, strict=True):
+        record["exceeded"] = checked(allowed_mm, stage.gap, stage.gap_error_mm, [])["exceeded"]
 
 
 def checked(

@@ -21,6 +21,7 @@ from problems.reporter import Stage
 
 from .fastener_forces import fastener_forces
 from .solution import Solution
+from .stages import StageAnswer
 from .validate import digits_sentence
 
 
@@ -37,6 +38,8 @@ def arrays_of(solution: Solution) -> dict[str, Any]:
         nodes = np.concatenate([scene.joint.nodes_of(name) for name in scene.joint.names])
     gaps = {"gap_before": solution.problem.load.g, "gap_after": solution.gap}
     arrays: dict[str, Any] = more | gaps | {"x": x, "lam": solution.lam}
+    if solution.stages:
+        arrays["stage_gaps"] = np.array([stage.gap for stage in solution.stages])
     arrays |= {"A_data": A.data, "A_indices": A.indices, "A_indptr": A.indptr}
     if isinstance(scene, JointScene) and (ids := scene.joint.ids) is not None:
         arrays |= {"node_ids": ids[0], "contact_ids": ids[1]}
@@ -46,7 +49,7 @@ def arrays_of(solution: Solution) -> dict[str, Any]:
 def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[str, Any]:
     """The record DIR/solution.json. built : the stages that the cache did not hold. solver : asked for."""
     problem, judgement = solution.problem, solution.judgement
-    scene, data, reference = problem.scene, problem.prepared, problem.reference
+    scene, data, reference = solution.scene, problem.prepared, problem.reference
     return {
         "method": solution.method,
         "status": solution.status,
@@ -66,8 +69,9 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "error_bound_mm": reference.bound_mm,
         "route": reference.route,
         "unusual": scene.unusual if isinstance(scene, JointScene) else [],
-        **layout(scene, data.assembly),
-        "fasteners": list(fastener_forces(scene, solution.x)),
+        **layout(problem.scene, data.assembly),
+        "fasteners": list(fastener_forces(problem.scene, solution.x)),
+        **({"stages": [_stage(stage) for stage in solution.stages]} if solution.stages else {}),
         "digits": digits_sentence(problem, solved=True)[0] if _is_given(scene) else None,
         "skipped": list(_skipped(solution, built, solver)),
         "steps": solution.seconds,
@@ -103,7 +107,8 @@ def summary(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
     error, bound = record["judged_error_mm"], record["error_bound_mm"]
     proven = np.isfinite(bound)
     if error is None:
-        text = f"every displacement within {bound:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
+        where = " of the last stage" if "stages" in record else ""
+        text = f"every displacement{where} within {bound:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
     else:
         which = f"with a proven bound ({bound:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
         away = f"{error:.1e} mm from the answer {which}"
@@ -136,11 +141,27 @@ def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
         parts.append(_part(name, slice(start, stop), outline) | {"clamped": list(clamped), "supports": held})
         start = stop
     pairs = [{"pair": p, "start": joint.span(p).start, "stop": joint.span(p).stop} for p in joint.pairs]
+    return {"parts": parts, "pairs": pairs, "marks": _marks(scene)}
+
+
+def _marks(scene: JointScene) -> dict[str, list[list[float]]]:
+    """The points that a picture marks, by the kind of effect."""
     marks: dict[str, list[list[float]]] = {}
     for effect in scene.effects:
-        if len(points := effect.marks(joint)):
+        if len(points := effect.marks(scene.joint)):
             marks.setdefault(effect.kind, []).extend(points.tolist())
-    return {"parts": parts, "pairs": pairs, "marks": marks}
+    return marks
+
+
+def _stage(stage: StageAnswer) -> dict[str, Any]:
+    return {
+        "name": stage.name,
+        "verdict": stage.judgement.verdict,
+        "error_bound_mm": stage.error_bound_mm,
+        "closed": int((stage.lam > 0).sum()),
+        "forces_N": stage.forces,
+        "marks": _marks(stage.scene),
+    }
 
 
 def _part(name: str, rows: slice, outline: list[float]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ first on four; the tenth is a sheet over a former, whose contact ends at one nod
 is that of the answer, interpolated. All meshes are solved in the sparse form.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,9 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.model.effect import GapEffect
 from problems.model.joint import Extension, Joint, Part
+from problems.model.junction_terms import junction_load
 from problems.model.scene import JointScene
+from problems.model.stage_answers import locked, through
 
 
 @dataclass(frozen=True)
@@ -97,19 +99,26 @@ def moved_mm(solution: Solution, joint: Joint) -> float:
 
     Raises InputError if the other mesh has no answer.
     """
-    scene: Any = solution.problem.scene
-    here, other = scene.joint, JointScene(scene.name, scene.title, joint, scene.effects)
-    g = _at(here, solution.problem.load.g, joint.nodes)
-    rest = [effect for effect in scene.effects if not isinstance(effect, GapEffect)]
-    data = prepared(other, form="sparse")
-    load = LoadCase(load_case(other, "sparse", rest).f, g)
-    _, lam = next(candidates(data, load), ("", None))
-    if lam is None:
-        raise InputError.one(other.name, "mesh", list(joint.junction.nodes), "one with an answer")
-    A = data.assembly.A
-    gap = g - A.T @ data.assembly.K.solve(load.f - A @ lam)
+    scene: Any = solution.scene
+    here, other = scene.joint, replace(scene, joint=joint)
+
+    def answer(part: JointScene, approaches: Matrix) -> tuple[Vector, Vector]:
+        """x and the gaps of a stage on the other mesh."""
+        gaps = [effect for effect in part.effects if isinstance(effect, GapEffect)]
+        rest = [effect for effect in part.effects if not isinstance(effect, GapEffect)]
+        one = locked(replace(part, effects=tuple(rest)), approaches[:, 0])
+        data = prepared(one, form="sparse")
+        load = LoadCase(load_case(one, "sparse").f, _at(here, junction_load(gaps, here)[1], joint.nodes))
+        _, lam = next(candidates(data, load), ("", None))
+        if lam is None:
+            raise InputError.one(other.name, "mesh", list(joint.junction.nodes), "one with an answer")
+        A = data.assembly.A
+        x = data.assembly.K.solve(load.f - A @ lam)
+        return data.assembly.at_junction(x), load.g - A.T @ x
+
+    *_, last = through(other, answer)
     nodes = min(here.nodes, joint.nodes, key=len)
-    return float(abs(_at(here, solution.gap, nodes) - _at(joint, gap, nodes)).max())
+    return float(abs(_at(here, solution.gap, nodes) - _at(joint, last.answer, nodes)).max())
 
 
 def _at(joint: Joint, values: Vector, places: Matrix) -> Vector:

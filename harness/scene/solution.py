@@ -11,6 +11,7 @@ import numpy as np
 
 from harness.planning.form_choice import Choice, chosen_form
 from harness.solving.session import answer_of, form_of
+from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, opened
 from problems.errors import InputError
@@ -62,6 +63,8 @@ class Solution:
         The form, and why it was chosen.
     problem : ReferenceProblem
         The matrices, loads and reference.
+    scene : Scene
+        The scene. That of `problem` is the last stage if it has some.
     stages : tuple of StageAnswer
         What each stage of the scene has reached; the other entries are those of the last one. Empty without
         stages.
@@ -81,12 +84,19 @@ class Solution:
     seconds: dict[str, float]
     choice: Choice
     problem: ReferenceProblem
+    scene: Scene
     stages: tuple[StageAnswer, ...] = ()
 
     @property
     def x(self) -> Vector:
         """Displacements (n,), mm."""
         return self.problem.prepared.assembly.at_junction(self.unknowns)
+
+    @property
+    def gap_error_mm(self) -> Vector:
+        """(m,) how far each gap is from the exact one at most, mm."""
+        problem, bound = self.problem, self.error_bound_mm
+        return GapError.of(problem.prepared.assembly)(problem.load.g, self.unknowns, bound)
 
     @property
     def has_contact(self) -> bool:
@@ -200,16 +210,17 @@ def solve(
         answer, stage = reached.answer, locked(reached.scene, reached.approaches[:, 0])
         history.append(
             StageAnswer(
-                name=reached.stage.name,
+                name=reached.name,
                 scene=stage,
                 x=answer.x,
                 lam=answer.lam,
                 gap=answer.gap,
                 judgement=answer.judgement,
                 error_bound_mm=answer.error_bound_mm,
+                gap_error_mm=answer.gap_error_mm,
             )
         )
-    return replace(answer, stages=tuple(history))
+    return replace(answer, scene=scene, stages=tuple(history))
 
 
 class _Clock:
@@ -281,6 +292,7 @@ def _solved(
         seconds=clock.seconds,
         choice=choice,
         problem=problem,
+        scene=scene,
     )
 
 

@@ -6,9 +6,11 @@ DIR is written beside its place and moved there when it is whole; what an older 
 import time
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.table import Table
 
 from harness.results.atomic_output import RECORD, atomic_output, refuse_unwritable
 from harness.results.records import replace_text, to_line
@@ -64,7 +66,12 @@ def solve_into(
         solution.seconds["mesh error"] = time.perf_counter() - begun
     record["grid"] = mesh_error.recorded(mesh)
     console.print(f"{record['grid']['said']}.")
-    code = DONE if record["verdict"] == "within" else FAILED
+    verdicts = [record["verdict"], *(stage.judgement.verdict for stage in solution.stages)]
+    code = DONE if set(verdicts) == {"within"} else FAILED
+    if solution.stages:
+        if allow_gap_mm is not None:
+            allowed_gap.check_stages(solution.stages, allow_gap_mm, record["stages"])
+        console.print(_history(record, arrays))
     if allow_gap_mm is not None:
         from report.page.answer_page_data import headline  # slow to import: not before the answer is shown
 
@@ -80,3 +87,14 @@ def solve_into(
         written = out / write(new).name
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
     return code
+
+
+def _history(record: dict[str, Any], arrays: dict[str, Any]) -> Table:
+    """A line per stage: largest gap and place, closed contacts, forces, and whether the gap is allowed."""
+    from report.page.answer_page_data import stage_lines  # slow to import: not before the answer is there
+
+    heads, *lines = stage_lines(record, arrays)
+    table = Table(*heads)
+    for line in lines:
+        table.add_row(*line)
+    return table

@@ -1,6 +1,8 @@
 """What a stage of a scene has reached."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from harness.verification.judge import Judgement
 from problems.forms.assembly import Vector
@@ -28,7 +30,9 @@ class StageAnswer:
     judgement : Judgement
         The judge's figures.
     error_bound_mm : float
-        Proven bound on max|x − x*|, mm, for the exact answer x* to `scene`.
+        Proven bound on max|x − x*|, mm, for the exact answer x* at the approaches that are locked.
+    gap_error_mm : array (m,), mm
+        How far each gap is at most from that of x*.
     """
 
     name: str
@@ -38,16 +42,14 @@ class StageAnswer:
     gap: Vector
     judgement: Judgement
     error_bound_mm: float
-
-    @property
-    def largest(self) -> int | None:
-        """The contact with the largest gap; None without contacts."""
-        return int(self.gap.argmax()) if len(self.gap) else None
+    gap_error_mm: Vector
 
     @property
     def forces(self) -> dict[str, float]:
-        """The sum of the forces in all fasteners of a kind, and of the contact forces as "contacts"; N."""
+        """The sum of the forces in fasteners, by the name or kind of the effect, and in "contacts"; N."""
         sums: dict[str, float] = {}
-        for fastener in fastener_forces(self.scene, self.x):
-            sums[fastener["kind"]] = sums.get(fastener["kind"], 0.0) + fastener["force_N"]
-        return sums | {"contacts": float(self.lam.sum())}
+        for effect in self.scene.effects:
+            name, alone = effect.name or effect.kind, replace(self.scene, effects=(effect,))
+            for fastener in fastener_forces(alone, self.x):
+                sums[name] = sums.get(name, 0.0) + fastener["force_N"]
+        return sums | {"contacts": float(np.nansum(self.lam))}

@@ -18,20 +18,20 @@ from problems.forms.assembly import Matrix, Vector
 
 from .effect import SpringEffect
 from .scene import JointScene
-from .stages import Acting, Elements, Plan, Stage, acting_effects, of_effect
+from .stages import Acting, Elements, Plan, acting_effects, of_effect
 
 Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
 class Reached(Generic[Answer]):
-    """A stage with its answer.
+    """A stage with its answer; its name is empty if the scene has no stages.
 
     scene : what acts at its end, a scene without stages. approaches : (r, cases) of its springs, mm; see
     `locked`.
     """
 
-    stage: Stage
+    name: str
     scene: JointScene
     approaches: Matrix
     answer: Answer
@@ -45,7 +45,7 @@ def through(
     Parameters
     ----------
     scene : JointScene
-        With stages.
+        With stages; without, it is one stage.
     solve : function
         Answers a scene without stages whose springs have the approaches (r, cases), mm: returns x (n,) or
         (n, cases) mm, of which fasteners lock their approach, and the answer to hand on.
@@ -68,7 +68,7 @@ def through(
         try:
             return solve(part, approaches)
         except InputError as error:
-            raise error.in_stage(step.stage.name) from error
+            raise error.in_stage(step.name) from error
 
     *_, last = steps = Plan(scene.effects, scene.stages, joint).steps
     for step in steps:
@@ -86,7 +86,7 @@ def through(
         if fresh:
             part, approaches = assembled(step, step.elements)
             _, answer = answered(step, part, approaches) if again else (x, answer)
-        yield Reached(step.stage, part, approaches, answer)
+        yield Reached(step.name, part, approaches, answer)
 
 
 def locked(scene: JointScene, approaches: Vector) -> JointScene:
@@ -108,12 +108,13 @@ def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
     if not scene.stages:
         return {"": scene}
     steps = Plan(scene.effects, scene.stages, scene.joint).steps
-    return {step.stage.name: _scene(scene, step, step.elements) for step in steps}
+    return {step.name: _scene(scene, step, step.elements) for step in steps}
 
 
 def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
     effects = tuple(acting_effects(scene.effects, elements, scene.joint).values())
-    return replace(scene, title=f"{scene.title}: {step.stage.name}", effects=effects, stages=())
+    title = f"{scene.title}: {step.name}" if step.name else scene.title
+    return replace(scene, title=title, effects=effects, stages=())
 
 
 def _given(scene: JointScene, cases: int) -> dict[int, Matrix]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from problems.input.bounded_types import Name, unknown
 
-from .effect import Effect, SpringEffect
+from .effect import Effect, ForceEffect, SpringEffect
 from .interface import AnyJoint
 from .joint import Faults, Table
 
@@ -34,9 +34,9 @@ class Stage(Table):
 
 @dataclass(frozen=True)
 class Acting:
-    """What acts in a stage. fresh : what the stage sets."""
+    """What acts in a stage of that name. fresh : what the stage sets."""
 
-    stage: Stage
+    name: str
     elements: Elements
     fresh: Elements
 
@@ -56,7 +56,7 @@ def acting_effects(effects: Sequence[Effect], elements: Elements, joint: AnyJoin
 class Plan:
     """What acts in each stage, as far as the names in the stages are right; `wrong` says which are not.
 
-    effects, stages : those of a scene. joint : its joint.
+    effects, stages : those of a scene. joint : its joint. steps : one without a name if there are no stages.
     """
 
     effects: Sequence[Effect]
@@ -71,6 +71,8 @@ class Plan:
         put = [
             self._named(k, "on", stage.on) | self._of_files(stage.name) for k, stage in enumerate(self.stages)
         ]
+        if not self.stages:
+            self.steps.append(Acting("", self.everything, frozenset()))
         self.staged = {element for sets in (*taken, *put) for some in sets.values() for element in some}
         acting = self.everything - self.staged
         for number, (stage, off, on) in enumerate(zip(self.stages, taken, put, strict=True)):
@@ -83,7 +85,7 @@ class Plan:
                 if elements & acting:
                     self._fault(number, "on", reference, "what does not act yet: this is set twice")
                 acting, fresh = acting | elements, fresh | elements
-            self.steps.append(Acting(stage, acting, fresh))
+            self.steps.append(Acting(stage.name, acting, fresh))
 
     @property
     def everything(self) -> Elements:
@@ -136,7 +138,7 @@ class Plan:
         yield from self.wrong
         for number, effect in enumerate(self.effects):
             where = f"effect[{number}] ({effect.kind})"
-            setting = [step.stage.name for step in self.steps if of_effect(number, step.fresh)]
+            setting = [step.name for step in self.steps if of_effect(number, step.fresh)]
             if setting and effect.contacts:
                 allowed = f"one that no stage names: a {effect.kind} makes a contact, which stays"
                 yield f"{where}.name", effect.name, allowed
@@ -147,19 +149,25 @@ class Plan:
             if setting and never:
                 allowed = f"all of its {self.counts[number]} points in stages, or none: {never[0]} is in none"
                 yield f"{where}.name", effect.name, allowed
-        if not self.wrong:
+        if self.stages and not self.wrong:
             yield from self._clashes()
 
     def _clashes(self) -> Faults:
-        """Yield the faults of effects that act together."""
+        """Yield the faults of effects that act together. A fastener may be set where a force presses."""
         told = [fault for effect in self.effects for fault in effect.faults(self.joint)]
         for step in self.steps:
             acting = acting_effects(self.effects, step.elements, self.joint)
             for number, effect in acting.items():
                 others = [other for k, other in acting.items() if k != number]
+                if isinstance(effect, SpringEffect):
+                    others = [
+                        one
+                        for one in others
+                        if isinstance(one, SpringEffect) or not isinstance(one, ForceEffect)
+                    ]
                 for fault in effect.faults(self.joint, others):
                     if fault not in told:
                         told.append(fault)
                         key, value, allowed = fault
                         where = f"effect[{number}] ({effect.kind}).{key}"
-                        yield where, value, f"{allowed}, in stage {step.stage.name}"
+                        yield where, value, f"{allowed}, in stage {step.name}"

@@ -1,5 +1,7 @@
 """Maps of answers: gaps, contact forces and displacements of one scene, and the gaps of two."""
 
+import itertools
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -7,18 +9,28 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from report.results.answer_record import Answer, pair_name
+from report.results.answer_record import Answer, pair_name, stages
 
 from . import style
 from .deformed_faces import deformed_figure
 from .gap_section import section_figure
 from .junction_maps import CLOSED, LARGER, RIM, Array, Map, Outlines, Scale, drawn, grid_of, rooted
 
+#: Colour and marker of the force in each kind of fastener over the stages.
+LINES = [
+    (style.VERMILLION, "s"),
+    (style.BLUE, "^"),
+    (style.GREEN, "D"),
+    (style.PURPLE, "v"),
+    (style.BLACK, "o"),
+]
+
 
 def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
     """The pictures of an answer by their names; those that it has nothing for are left out."""
     with style.applied():
-        figures = {"gap": _gap(record, arrays)} if record["m"] else {}
+        figures = stage_figures(record, arrays) if "stage_gaps" in arrays and record["m"] else {}
+        figures |= {"gap": _gap(record, arrays)} if record["m"] else {}
         for name, view in (("section", section_figure), ("deformed", deformed_figure)):
             if (figure := view(record, arrays)) is not None:
                 figures[name] = figure
@@ -53,6 +65,32 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         for name, gap, lines in zip(("gap before", "gap after"), gaps, ((), outlines), strict=True)
     ]
     return drawn([item for pair in zip(*sides, strict=True) for item in pair], 2)[0]
+
+
+def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
+    """`history`, the largest gap and the forces over the stages, and `stage-gaps`, on one scale."""
+    table = stages(record, arrays)
+    history = style.figure(4.2)
+    gap, force = history.subplots(2, 1, sharex=True)
+    gap.plot(table["stage"], table["largest_mm"], color=style.BLACK, marker="o")
+    if allowed := record.get("allowed_gap"):
+        gap.axhline(allowed["allowed_mm"], color=LARGER, linestyle="--", label="limit")
+        gap.legend()
+    gap.set(ylabel="largest gap, mm", ylim=(0, None))
+    names = [name for name in table.columns if name.endswith(", N")]
+    for name, (colour, marker) in zip(names, itertools.cycle(LINES), strict=False):
+        look: dict[str, Any] = {"color": colour, "marker": marker, "markerfacecolor": "none"}
+        force.plot(table["stage"], table[name], label=name.removesuffix(", N"), **look)
+    force.set(ylabel="sum of forces, N")
+    force.set_xticks(range(len(table)), [textwrap.fill(name, 14) for name in table["stage"]])
+    force.legend()
+    scale = rooted("gap, mm", "viridis", arrays["stage_gaps"])
+    maps = [
+        item
+        for stage, values in zip(record["stages"], arrays["stage_gaps"], strict=True)
+        for item in _pairs(stage["name"], (record | {"marks": stage["marks"]}, arrays), values, scale)
+    ]
+    return {"history": history, "stage-gaps": drawn(maps, 2)[0]}
 
 
 def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:

@@ -6,7 +6,7 @@ from report.document.numbers import listed, out_of, position, significant
 from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
 from report.page.page_figures import map_item
 from report.page.page_file import Data, banner
-from report.results.answer_record import Answer, fasteners, pair_name
+from report.results.answer_record import Answer, fasteners, pair_name, stages
 from report.results.series_results import Array
 
 CODE = ("machine", "commit", "clean", "recorded_at")
@@ -24,11 +24,19 @@ def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
         "heads": ["kind", "contact", "x, mm", "y, mm", "force, N"],
         "lines": forces,
     }
+    history = stage_lines(record, arrays)
+    stages_table = {"title": "Stages", "summary": "", "heads": history[0], "lines": history[1:]}
     page = _with_maps([record], facts(record), answer_maps(record, arrays))
-    return page | {
-        "headline": headline(record, arrays),
-        "tables": [*([table] if forces else []), *page["tables"]],
-    }
+    more = [*([stages_table] if history[1:] else []), *([table] if forces else [])]
+    return page | {"headline": headline(record, arrays), "tables": [*more, *page["tables"]]}
+
+
+def stage_lines(record: Data, arrays: dict[str, Array]) -> list[list[str]]:
+    """The headings and the lines of the table of the stages; without stages, no line."""
+    table = stages(record, arrays)
+    shown = table.map(lambda value: significant(value) if isinstance(value, float) else str(value))
+    heads = [name.replace("_mm", " gap, mm") for name in shown.columns]
+    return [heads, *shown.to_numpy().tolist()]
 
 
 def facts(record: Data) -> list[list[str]]:

@@ -48,7 +48,9 @@ def scene_maps(results: Results) -> Data:
 
 def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     """The maps of one answer, one per pair of parts in contact."""
-    return _pairs(record, {text: arrays[name] for name, text in FIELDS.items()}, arrays)
+    fields = {text: arrays[name] for name, text in FIELDS.items()}
+    gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
+    return _pairs(record, fields | {f"gap of {stage['name']}": gap for stage, gap in gaps}, arrays)
 
 
 def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:

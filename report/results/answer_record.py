@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from report.document.escape import quoted
+from report.document.numbers import position, without_rounding
 
 from .series_results import Array
 
@@ -47,6 +48,32 @@ def fasteners(record: dict[str, Any]) -> pd.DataFrame:
         for each in record.get("fasteners") or []
     ]
     return pd.DataFrame(lines, columns=["kind", "contact", "x_mm", "y_mm", "force_N"])
+
+
+VERDICTS = {True: "FAIL", False: "PASS", None: "cannot be told"}
+
+
+def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
+    """One line per stage: its largest gap, closed contacts, forces by the name of their effect, and verdict.
+
+    Forces of what does not act are missing; there is a verdict only if there is a limit.
+    """
+    told, lines = record.get("stages", []), []
+    for stage, gap in zip(told, arrays.get("stage_gaps", ()), strict=True):
+        line: dict[str, Any] = {
+            "stage": stage["name"],
+            "largest_mm": gap.max() if len(gap) else np.nan,
+            "at": "",
+        }
+        if len(gap) and "contact_nodes" in arrays:
+            line["at"] = position(arrays["contact_nodes"][gap.argmax()], arrays["contact_nodes"])
+        most = max(map(abs, stage["forces_N"].values()))
+        forces = {f"{name}, N": without_rounding(force, most) for name, force in stage["forces_N"].items()}
+        verdict = {"verdict": VERDICTS[stage["exceeded"]]} if "exceeded" in stage else {}
+        lines.append(line | {"closed": stage["closed"]} | forces | verdict)
+    table = pd.DataFrame(lines)
+    last = [name for name in ("contacts, N", "verdict") if name in table]
+    return table[[*table.columns.drop(last), *last]]
 
 
 def _places(heading: str, names: list[str], places: Array | None, ids: Array | None) -> pd.DataFrame:

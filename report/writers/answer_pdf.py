@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from report.document.escape import plain
 from report.document.numbers import position, significant
 from report.figures import style
-from report.page.answer_page_data import facts, headline
+from report.page.answer_page_data import facts, headline, stage_lines
 from report.page.page_file import minute
 from report.results.answer_record import fasteners
 from report.results.series_results import Array
@@ -42,6 +42,9 @@ def write_pdf(path: Path, record: dict[str, Any], arrays: dict[str, Array], pict
     room = int((page.at - LOWEST) / LINE) - len(origin) - 4
     if len(forces) > room:
         forces = [*forces[:room], f"and {len(forces) - room} more: answer.md"]
+    page.lines(
+        "Stages", [", ".join(line) for line in stage_lines(record, arrays)] if "stages" in record else []
+    )
     page.lines("Forces in the fasteners", forces)
     sure = [f"{record['grid']['said']}.", *(f"{name}: {value}" for name, value in origin)]
     page.lines("How sure it is, and from what", sure)

@@ -9,17 +9,19 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
-from report.document.numbers import extent, significant
+from report.document.numbers import extent, significant, whole
 from report.figures.answer_maps import answer_figures
 from report.figures.junction_maps import grid_of
 from report.page.answer_page_data import answer_data, facts, headline
 from report.page.page_file import write as write_page
-from report.results.answer_record import contacts, fasteners, nodes, pair_name, read
+from report.results.answer_record import contacts, fasteners, nodes, pair_name, read, stages
 from report.results.series_results import Array
 from report.writers.answer_pdf import write_pdf
 from report.writers.sections_writer import written
 
 CAPTIONS = {
+    "history": "*The largest gap, and the sums of the forces,* at the end of each stage.",
+    "stage-gaps": "*The gap at the end of each stage,* on one square-root scale.",
     "section": "*A section through the largest gap*, its height exaggerated: the faces of the parts.",
     "deformed": "*The parts around the largest gap*, not to scale: the first grey, the second coloured by "
     "the gap left.",
@@ -47,7 +49,10 @@ def write(directory: Path) -> Path:
         figures = answer_figures(record, arrays)
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
     drawn = {name: Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()}
-    blocks += [drawn.pop(name) for name in ("gap", "section", "deformed") if name in drawn]
+    blocks += [*_stages(record, arrays)]
+    blocks += [
+        drawn.pop(name) for name in ("history", "stage-gaps", "gap", "section", "deformed") if name in drawn
+    ]
     blocks += [*_fields(record, arrays), *drawn.values()]
     mesh_error = Text(f"{_proven(record)} {record['grid']['said']}.")
     sure: list[Block] = [mesh_error, facts_table("", "*The solve.*", dict(facts(record)))]
@@ -71,6 +76,7 @@ def _proven(record: dict[str, Any]) -> str:
     text = "No bound on the error could be proven."
     if bound is not None:
         whose = "The reference" if record["judged_error_mm"] is not None else "Every displacement"
+        whose += " of the last stage, at the approaches locked before," if "stages" in record else ""
         text = f"{whose} is within **{significant(bound)} mm** of the exact solution (proven bound)."
     if record["qp"]:
         return text
@@ -106,6 +112,19 @@ def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
     ]
     columns = [word("part", "part"), _range("displacement, mm", "x")]
     return [*blocks, Table("", "*The parts.*", pd.DataFrame(parts), columns)]
+
+
+def _stages(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
+    """The history of a scene with stages; `stages.csv` has it, too."""
+    if "stages" not in record:
+        return []
+    table = stages(record, arrays)
+    columns = [word("stage", "stage"), number("largest gap, mm", "largest_mm"), word("at", "at")]
+    columns += [number("closed", "closed", whole)]
+    columns += [number(name, name) for name in table.columns if name.endswith(", N")]
+    columns += [word("verdict", "verdict")] if "verdict" in table else []
+    caption = "*The stages.* The answer below is that of the last one; forces are sums."
+    return [Table("stages", caption, table, columns)]
 
 
 def _range(heading: str, name: str) -> Column:

@@ -1,13 +1,24 @@
 """What takes a scene with stages: its last stage is what is measured, exported and judged."""
 
+import json
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
+from rich.console import Console
 from small_joints import two_parts
 
+from harness.scene.mesh_error import moved_mm
 from harness.scene.solution import solve
+from harness.scene.solve import solve_into
+from harness.terminal import FAILED, GAP_EXCEEDED
 from harness.verification.reference_problem import last_stage, opened
 from problems.forms import Form
+from problems.model.joint import Joint
+from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from rivetbench import export, judge, validate
 
@@ -63,3 +74,50 @@ def test_export_is_the_last_stage(staged: Path, tmp_path: Path) -> None:
     again = solve(str(files))
     assert abs(again.x - answer.x).max() <= 1e-10
     assert validate(staged) is not None
+
+
+def test_the_history_is_in_all_that_solve_writes(staged: Path, tmp_path: Path) -> None:
+    """The clamped parts keep the limit, the released ones do not: the exit code is that of the last stage."""
+    answer, told, out = solve(str(staged)), StringIO(), tmp_path / "out"
+    largest = [stage.gap.max() for stage in answer.stages]
+    limit = (largest[1] + largest[2]) / 2
+    assert largest[0] < limit < largest[2]
+    console = Console(file=told, width=200)
+    code = solve_into(str(staged), None, 1e-9, out, console, allow_gap_mm=limit)
+    assert code == GAP_EXCEEDED
+    record = json.loads((out / "solution.json").read_text())
+    assert [stage["exceeded"] for stage in record["stages"]] == [False, False, True]
+    assert record["scene_key"] == read_scene(str(staged)).key
+    assert {one["kind"] for one in record["fasteners"]} == {"installed_fasteners"}
+    with np.load(out / "solution.npz") as arrays:
+        np.testing.assert_array_equal(arrays["stage_gaps"], [stage.gap for stage in answer.stages])
+    page, table = (out / "answer.md").read_text(), pd.read_csv(out / "stages.csv")
+    np.testing.assert_allclose(table["largest_mm"], largest, rtol=1e-12)
+    np.testing.assert_allclose(table["contacts, N"], [stage.lam.sum() for stage in answer.stages], rtol=1e-9)
+    assert table["verdict"].tolist() == ["PASS", "PASS", "FAIL"]
+    assert table["clamps, N"].tolist()[:2] == [120.0, 120.0]
+    for text in (told.getvalue(), page):
+        assert "| release |" in text.replace("│", "|")
+    assert "gap of clamp" in (out / "index.html").read_text()
+    assert (out / "history.png").is_file()
+    assert (out / "stage-gaps.png").is_file()
+
+
+def test_a_stage_that_is_not_proven_fails_the_answer(
+    staged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer = solve(str(staged))
+    first, *others = answer.stages
+    doubtful = replace(first, judgement=replace(first.judgement, verdict="cannot_be_judged"))
+    monkeypatch.setattr(
+        "harness.scene.solve.solve", lambda *_, **__: replace(answer, stages=(doubtful, *others))
+    )
+    assert solve_into(str(staged), None, 1e-9, tmp_path / "out", Console(file=StringIO())) == FAILED
+
+
+def test_mesh_error_goes_through_the_stages(staged: Path) -> None:
+    """On its own mesh nothing moves, though the approaches are reached anew."""
+    answer = solve(str(staged))
+    assert isinstance(answer.scene, JointScene)
+    assert isinstance(answer.scene.joint, Joint)
+    assert moved_mm(answer, answer.scene.joint) <= 1e-9

@@ -27,13 +27,13 @@ FORCE, STIFFNESS = 30.0, 900.0
 
 
 def strips(**rivets: Any) -> JointScene:
-    """Two strips built in at both ends, pressed together at the middle; a rivet between the forces."""
+    """Two strips built in at both ends, pressed together at the middle, and riveted where they are."""
     ends = {"length": (LENGTH - 20) / 2, "elements": 3}
     strip = {"thickness": THICKNESS, "young": YOUNG, "poisson": 0.0, "clamped": ["south", "north"]}
     parts = [strip | {"name": name, "south": ends, "north": ends} for name in "ab"]
     junction = {"length": WIDTH, "width": 20.0, "nodes": [2, 3]}
     forces = {"points": [[0.0, 10.0], [WIDTH, 10.0]], "preload": FORCE / 2}
-    rivet = {"points": [[WIDTH / 2, 10.0]], "stiffness": STIFFNESS}
+    rivet = {"points": forces["points"], "stiffness": STIFFNESS / 2}
     effects = [
         {"kind": "initial_gap", "mean": 50.0},
         {"kind": "fasteners", "name": "tacks"} | forces,
@@ -65,8 +65,8 @@ def test_spring_back_of_a_strip(form: Form, preload: float) -> None:
 
     The width of the strips bends between the two forces, too: c is 1.4e-4 above that of a beam.
     """
-    answer = solve(strips(preload=preload), form=form)
-    first = answer.stages[0].forces["fasteners"] * C
+    answer = solve(strips(preload=preload / 2), form=form)
+    first = answer.stages[0].forces["tacks"] * C
     assert approach(answer, 0) == pytest.approx(first, rel=2e-4)
     first = approach(answer, 0)
     c = first / FORCE
@@ -75,7 +75,7 @@ def test_spring_back_of_a_strip(form: Form, preload: float) -> None:
     found = [approach(answer, stage) for stage in (1, 2)]
     np.testing.assert_allclose(found, [set_there, springs_back], rtol=1e-9)
     *_, last = answer.stages
-    assert last.forces["installed_fasteners"] == pytest.approx(springs_back / c, rel=1e-7)
+    assert last.forces["rivets"] == pytest.approx(springs_back / c, rel=1e-7)
     assert [stage.judgement.verdict for stage in answer.stages] == ["within"] * 3
 
 
@@ -233,6 +233,7 @@ def test_the_stage_of_a_point_may_stand_in_its_file(tmp_path: Path) -> None:
         joined(stages[:2], effects)
 
 
+PIN = [[390.0, 100.0]]
 SUPPORTS = [[0.0, 10.0], [400.0, 10.0], [200.0, 200.0]]
 BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"name": "1", "on": ["clamp"]}], {}, "stage[0] (1).on = 'clamp'", "did you mean clamps?"),
@@ -257,7 +258,12 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
         "or none: 3 is in none",
     ),
     ([CLAMP], {"name": "clamps"}, "effect[2].name = 'clamps'", "effect[1] has it"),
-    ([CLAMP], {"points": [[100.0, 40.0]]}, "effect[2] (installed_fasteners).points", "in stage clamp"),
+    (
+        [{"name": "1", "on": ["rivets"]}],
+        {"points": PIN},
+        "effect[2] (installed_fasteners).points",
+        "separate places: installed_fasteners acts at the same ones, in stage 1",
+    ),
     ([CLAMP], {"approach": [0.1, 0.2]}, "approach", "one for each of 4 springs"),
     ([CLAMP], {"preload": -1.0}, "preload", "in N"),
     (
@@ -275,7 +281,8 @@ def test_bad_stages(stages: list[Tables], rivets: Tables, where: str, allowed: s
     legs = {"kind": "supports", "name": "legs", "part": "b", "points": SUPPORTS}
     legged = PART | {"name": "b", "clamped": []}
     joint = JOINT | {"part": [PART | {"name": "a"}, legged]}
-    effects = [*EFFECTS[:2], EFFECTS[2] | rivets, EFFECTS[3], tool, legs]
+    pin = {"kind": "installed_fasteners", "between": ["a", "b"], "points": PIN, "approach": 0.1}
+    effects = [*EFFECTS[:2], EFFECTS[2] | rivets, EFFECTS[3], tool, legs, pin]
     with pytest.raises(InputError) as error:
         joined(stages, effects, joint)
     (line,) = str(error.value).split("\n")
