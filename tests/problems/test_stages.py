@@ -173,6 +173,20 @@ def test_superelements_go_through_the_same_stages(tmp_path: Path) -> None:
         assert abs(mine.x - theirs.x).max() <= 1e-8
 
 
+def test_what_the_last_stage_sets_is_in_its_problem() -> None:
+    """Fasteners of two effects, each with approaches of its own."""
+    pins = EFFECTS[2] | {"name": "pins", "points": [[30.0, 90.0], [370.0, 90.0]]}
+    together = {"name": "rivet", "on": ["rivets", "pins"]}
+    answer = solve(joined([CLAMP, together], [*EFFECTS, pins]))
+    springs = [e for e in answer.problem.scene.effects if e.kind == "installed_fasteners"]  # type: ignore[attr-defined]
+    scene = joined([], EFFECTS)
+    W = [scene.joint.weights(np.array(points)) for points in (RIVETS, pins["points"])]  # type: ignore[union-attr]
+    a, b = answer.x.reshape(2, -1)
+    for spring, weights in zip(springs, W, strict=True):
+        np.testing.assert_allclose(spring.approach, weights @ (a - b), atol=1e-9)
+    assert answer.stages[-1].forces["rivets"] == pytest.approx(0.0, abs=1e-4)
+
+
 def test_many_cases_go_through_at_once() -> None:
     """Each load case locks approaches of its own."""
     scene = joined(

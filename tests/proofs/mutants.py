@@ -243,6 +243,31 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "same and change and not": ("same and not",),
         " and not case.trial.lam[~case.C].any()": ("",),
     },
+    "problems/model/effect.py": {
+        "T @ (k * self.approach + self.preload)": (
+            "T @ (k * self.approach)",
+            "T @ (self.approach + self.preload)",
+        ),
+        "k * (self.approach - T.T @ x) + self.preload": (
+            "k * (self.approach - T.T @ x)",
+            "k * (self.approach + T.T @ x) + self.preload",
+        ),
+    },
+    "problems/model/joint_model.py": {
+        "self.springs.key(key) if self.springs else key\n        like": ("key\n        like",),
+    },
+    "problems/model/stage_answers.py": {
+        "step.elements - fresh)": ("step.elements)",),
+        "reached[:, elements]": ("0.5 * reached[:, elements]",),
+        "step is last": ("False",),
+        "again or effect.preload != 0": ("again",),
+        "tuple(approaches[start:stop]": ("tuple(approaches[: stop - start]",),
+    },
+    "problems/model/stages.py": {
+        "acting = self.everything - self.staged": ("acting = self.everything",),
+        "acting -= elements": ("pass",),
+        "fresh | elements": ("fresh",),
+    },
     "solvers/kkt.py": {
         "max(float((-y).max(initial=0.0)), float(": ("max(float(",),
         "float(abs(y[lam > 0]).max(initial=0.0))": ("0.0", "float(y[lam > 0].min(initial=0.0))"),
@@ -290,5 +315,9 @@ TESTS = {
         "problems/test_outside.py",
         "proofs/test_fuzz_exact.py",
     ),
+    "problems/model/effect.py": ("problems/test_stages.py",),
+    "problems/model/joint_model.py": ("problems/test_stages.py",),
+    "problems/model/stage_answers.py": ("problems/test_stages.py",),
+    "problems/model/stages.py": ("problems/test_stages.py",),
     "solvers/kkt.py": ("proofs/test_terms_verdict.py",),
 }
