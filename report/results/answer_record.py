@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from report.document.escape import quoted
-from report.document.numbers import position, without_rounding
+from report.document.numbers import position
 
 from .series_results import Array
 
@@ -50,6 +50,7 @@ def fasteners(record: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=["kind", "contact", "x_mm", "y_mm", "force_N"])
 
 
+ROUNDING = 1e-9  # of the largest force: a smaller one is rounding
 VERDICTS = {True: "FAIL", False: "PASS", None: "cannot be told"}
 
 
@@ -67,8 +68,9 @@ def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
         }
         if len(gap) and "contact_nodes" in arrays:
             line["at"] = position(arrays["contact_nodes"][gap.argmax()], arrays["contact_nodes"])
-        most = max(map(abs, stage["forces_N"].values()))
-        forces = {f"{name}, N": without_rounding(force, most) for name, force in stage["forces_N"].items()}
+        forces = {f"{name}, N": force for name, force in stage["forces_N"].items()}
+        least = ROUNDING * max(map(abs, forces.values()))
+        forces = {name: force if abs(force) > least else 0.0 for name, force in forces.items()}
         verdict = {"verdict": VERDICTS[stage["exceeded"]]} if "exceeded" in stage else {}
         lines.append(line | {"closed": stage["closed"]} | forces | verdict)
     table = pd.DataFrame(lines)

@@ -1,6 +1,8 @@
 """What takes a scene with stages: its last stage is what is measured, exported and judged."""
 
 import json
+import re
+import shutil
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -121,3 +123,30 @@ def test_mesh_error_goes_through_the_stages(staged: Path) -> None:
     assert isinstance(answer.scene, JointScene)
     assert isinstance(answer.scene.joint, Joint)
     assert moved_mm(answer, answer.scene.joint) <= 1e-9
+
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_tutorial_says_what_its_scenes_give(tmp_path: Path) -> None:
+    page = (ROOT / "docs/stages.md").read_text("utf-8")
+    folder = shutil.copytree(ROOT / "examples/riveting", tmp_path / "riveting")
+    stages = "\n".join(re.findall(r"```toml\n(.*?)```", page, re.DOTALL))
+    assert stages in (folder / "with-tacks.toml").read_text("utf-8")
+    answer = solve(str(folder / "with-tacks.toml"))
+    rows = [re.split(r" *\| *", line)[1:-1] for line in page.splitlines() if line.count("|") == 10][2:]
+    assert [stage.name for stage in answer.stages] == [row[0] for row in rows]
+    for stage, (_, gap, _, closed, *forces, _) in zip(answer.stages, rows, strict=True):
+        found = [stage.forces.get(name, np.nan) for name in ("clamps", "tacks", "rivets", "contacts")]
+        stated = [float(text.replace("–", "nan")) for text in (gap, closed, *forces)]
+        np.testing.assert_allclose([stage.gap.max(), (stage.lam > 0).sum(), *found], stated, 5e-3, 1e-6)
+    apart = solve(str(folder / "without-tacks.toml")).gap.max()
+    assert f"{answer.gap.max():.3f} mm with tacks, {apart:.3f} mm without" in page
+    table = folder / "rivets.csv"
+    line = re.findall(r"```text\n(.*?\n)```", page)[0]
+    table.write_text(table.read_text() + line)
+    assert f"passes, with {solve(str(folder / 'with-tacks.toml')).gap.max():.4f} mm" in page
+    scene = (folder / "with-tacks.toml").read_text()
+    table.write_text(table.read_text().removesuffix(line))
+    (folder / "with-tacks.toml").write_text(scene.replace("preload = 100.0", "preload = 200.0"))
+    assert solve(str(folder / "with-tacks.toml")).gap.max() == pytest.approx(answer.gap.max(), rel=1e-3)
