@@ -111,6 +111,7 @@ def test_a_stage_that_is_not_proven_fails_the_answer(
     answer = solve(str(staged))
     first, *others = answer.stages
     doubtful = replace(first, judgement=replace(first.judgement, verdict="cannot_be_judged"))
+    monkeypatch.setattr("report.writers.answer_report.write", lambda folder: folder / "answer.md")
     monkeypatch.setattr(
         "harness.scene.solve.solve", lambda *_, **__: replace(answer, stages=(doubtful, *others))
     )

@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from small_problems import solve_by_nnls
 
+from harness.scene.solution import solve
 from harness.verification.reference import reference
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase
@@ -66,6 +67,26 @@ def test_warm_panel() -> None:
     edge = x[: joint.junction.nodes[0]]
     assert edge[12] == pytest.approx(kappa * 1200.0**2 / 8, rel=1e-7)
     np.testing.assert_allclose(np.diff(edge, 2), -kappa * 50.0**2, rtol=1e-6)
+
+
+def test_spring_back() -> None:
+    """Built-in strips, pressed together at the middle by P, held at both quarters once P is gone.
+
+    Deflections in L³/EI: 1/192 and 1/384 at the middle and the quarters of P there, 5/1536 at a quarter of
+    forces at both. The rivets hold P/384 with 4/5 P each, and the middle goes back from 1/192 to 4/5 of that.
+    """
+    answer = solve("gallery/spring-back")
+    joint, (tacked, riveted, released) = answer.scene.joint, answer.stages  # type: ignore[attr-defined]
+    f = sum(400.0**3 / (70e3 * 60.0 * t**3 / 12) for t in (2.0, 4.0))
+    held = 1.0 * 192 / 384 / (5 / 1536 * f + 1 / 5e5)  # five rivets of 1e5 N/mm each in a row
+    opened = 1.0 - held * f / 192
+    middle = joint.nodes[:, 1] == 100.0
+    assert tacked.gap[middle].max() < 1e-9
+    assert tacked.forces["contacts"] == pytest.approx(20.0 - 192 / f, rel=2e-3)
+    assert riveted.forces["rivets"] == pytest.approx(0.0, abs=1e-6)
+    assert released.gap[middle] == pytest.approx(opened, rel=1e-3)
+    assert opened == pytest.approx(0.2, rel=1e-3)
+    assert released.forces["rivets"] == pytest.approx(2 * held, rel=1e-3)
 
 
 def test_shifted_support() -> None:

@@ -325,7 +325,7 @@ def test_a_sparse_k_stays_sparse_in_the_sparse_form(tmp_path: Path) -> None:
     parts = [write_part(tmp_path, name, K, flat(nodes)) for name in "ab"]
     scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.05}, FASTENERS, INSTALLED)
     model: Any = model_of(scene)
-    assert model.holds_sparse
+    assert model.stored_sparse is not None
     made = prepared(scene, form="sparse").assembly
     assert not made.K.dense
     v = np.random.default_rng(0).standard_normal(5002)
