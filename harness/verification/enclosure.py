@@ -195,7 +195,8 @@ def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Matrix, C
         entries = panel * unit
         size = abs(entries)
         largest, total = size.max(axis=1, keepdims=True), size.sum(axis=1, keepdims=True)
-        return entries, panel.shape[1] * (largest > 0), exponent(largest), total, lambda of_row: of_row
+        count = np.count_nonzero(entries, axis=1, keepdims=True)  # far fewer where a dense K has zeros
+        return entries, count, exponent(largest), total, lambda of_row: of_row
     entries, count = panel.data * unit[panel.indices], np.diff(panel.indptr)
     size, largest = abs(entries), np.zeros(len(count))
     largest[count > 0] = np.maximum.reduceat(size, panel.indptr[:-1][count > 0]) if entries.size else 0

@@ -36,11 +36,6 @@ class BandedInverse:
     order: Indices
     band: Matrix
 
-    @property
-    def whole(self) -> bool:
-        """Whether nothing is beyond the band: M is Q⁻¹."""
-        return len(self.band) > len(self.order)
-
     def product(self, v: Vector) -> Vector:
         """M v."""
         return blas.dsbmv(len(self.band) - 1, 1.0, self.band, v, lower=1)

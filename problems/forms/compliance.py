@@ -4,10 +4,12 @@ narrow band, from Q itself or from local blocks of it.
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
+from problems.stiffness import power_of_two
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.dense_block import product
 from problems.stiffness.operator import Stiffness
@@ -25,8 +27,13 @@ class ComplianceProducts:
 
     def __matmul__(self, lam: Matrix) -> Matrix:
         """Q λ, λ (m,) or (m, k)."""
-        product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
+        product: Matrix = self.At @ self.K.solve(self.A @ lam)
         return product
+
+    @cached_property
+    def At(self) -> sp.csr_array:
+        """Aᵀ; SciPy would make it anew for each product."""
+        return sp.csr_array(self.A.T)
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,6 @@ Compliance = ComplianceProducts | DenseCompliance
 
 
 SAMPLE = 3  # contacts, for the size of Q
-FEW = 3000  # contacts for which Q is small beside K
 SETS = 15  # factorisations of K that settle the contacts without M
 WIDEST_WINDOW = 1 / 4  # of the contacts: M with wider ones costs as much as Q⁻¹
 STEPS, CONTRACTION = 3, 0.5  # of e ← e − MQe from a random e, and what the last one must achieve
@@ -84,20 +90,21 @@ def whole_inverse(Q: DenseCompliance) -> BandedInverse:
 
 def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
     """M from local blocks of the Q of `like`, which has the same contacts: in single precision, or in double
-    where some block is not positive definite in that. For few contacts without coordinates M is Q⁻¹.
+    where some block is not positive definite in that.
 
-    There is no M where K has no band, where e ← e − MQe converges slowly, and for many contacts all over an
+    There is no M where K has no band, where e ← e − MQe converges slowly, and for contacts all over an
     area, where M takes longer than some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises
     LinAlgError if Q is indefinite.
     """
-    m, windows = assembly.m, _along_bands(assembly)
-    few = m <= FEW
-    if few and assembly.contact_nodes is None:
-        Q = DenseCompliance(assembly.K.compliance(assembly.A))
-        banded = of_dense(Q, None)
-        return replace(banded, M=banded.M or whole_inverse(Q))
-    inverse = None
-    if few or windows.work <= SETS * assembly.K.factorisation_flops:
+    lengths = abs(assembly.A).max(axis=0).toarray()
+    R = 1 / power_of_two(np.where(lengths, lengths, 1.0))  # in other units of the contacts, the same M
+    assembly, like = (replace(one, A=sp.csc_array(one.A * R)) for one in (assembly, like))
+    return _of_unit_contacts(assembly, like).scaled(1 / R)
+
+
+def _of_unit_contacts(assembly: Assembly, like: Assembly) -> ApproximateInverse:
+    windows, inverse = _along_bands(assembly), None
+    if windows is not None and windows.work <= SETS * assembly.K.factorisation_flops:
         if _single_might_do(assembly):
             with suppress(np.linalg.LinAlgError):
                 inverse = _from_windows(like, windows, single=True)
@@ -136,8 +143,10 @@ def _single_might_do(assembly: Assembly) -> bool:
     return bool(q.max(initial=0.0) * stiffest < 2.0**SINGLE_BITS)
 
 
-def _along_bands(assembly: Assembly) -> Windows:
-    """Windows along the joint; without coordinates along the bands, a line of contacts per half-bandwidth."""
+def _along_bands(assembly: Assembly) -> Windows | None:
+    """Windows along the joint; without coordinates along the bands, a line of contacts per half-bandwidth, or
+    None if a contact couples unknowns that are farther apart than a window.
+    """
     if assembly.contact_nodes is not None:
         return Windows.of(assembly.contact_nodes, assembly.m)
     places, widest = np.arange(assembly.n), 1
@@ -146,5 +155,8 @@ def _along_bands(assembly: Assembly) -> Windows:
             widest = max(widest, block.width + 1)
             if block.order is not None:
                 places[rows.start + block.order] = np.arange(rows.start, rows.stop)
-    first = places[assembly.A.indices[assembly.A.indptr[:-1]]]
+    ends, of_contacts = assembly.A.indptr[:-1], places[assembly.A.indices]
+    first = np.minimum.reduceat(of_contacts, ends)
+    if (np.maximum.reduceat(of_contacts, ends) - first).max() > WINDOW_LINES * widest:
+        return None
     return Windows(np.argsort(first, kind="stable"), max(1, assembly.m * widest // assembly.n))

@@ -102,7 +102,7 @@ class Prepared:
 
     @property
     def Q(self) -> Matrix:
-        """Q = AᵀK⁻¹A, (m, m), mm/N, made when first needed; no code of the sparse form needs it."""
+        """Q = AᵀK⁻¹A, (m, m), mm/N, made when first needed; in the sparse form only `mprgp` needs it."""
         if self.Q_if_made is None:
             self.Q_if_made = self.make_Q()
         return self.Q_if_made

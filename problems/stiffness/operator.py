@@ -233,6 +233,9 @@ class ScaledStiffness(Stiffness):
         """(DKD)⁻¹b = D⁻¹K⁻¹D⁻¹b."""
         return _times(1 / self.D, self.base.solve(_times(1 / self.D, b)))
 
+    def least_eigenvalues(self, D: Vector, steps: int = POWER_STEPS) -> list[float]:
+        return self.base.least_eigenvalues(self.D * D, steps)
+
     def panels(self) -> Iterator[tuple[slice, slice, Any]]:
         for rows, columns, panel in self.base.panels():
             yield rows, columns, sp.diags_array(self.D[rows]) @ panel @ sp.diags_array(self.D[columns])

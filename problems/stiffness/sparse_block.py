@@ -2,7 +2,7 @@
 where the extra `cholmod` is installed, or by SuperLU.
 
 Three numberings are tried: the given one, the one along the longer side of the model, and Cuthill and
-McKee's. The first that gives a narrow band is taken.
+McKee's, until a band is as narrow as on a square grid; else the narrowest is taken, if it is worth it.
 """
 
 from collections.abc import Iterator
@@ -23,21 +23,22 @@ if TYPE_CHECKING:
     from .cholmod import Cholmod
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
+OF_GRID = 4.0  # times √N: a square grid of four unknowns a node, line by line, has a half-bandwidth of 2√N
 WITH_INDICES = 1.5  # numbers of eight bytes per entry of a sparse matrix
 
 
 def sparse_block(K: sp.csc_array, nodes: Matrix | None = None) -> SparseBlock:
     """K (N, N) with its kind of factor, not made yet. nodes : (N, 2) of the unknowns, if known."""
-    widest = BAND_TO_ROW * K.nnz / max(K.shape[0], 1)
-    least = half_bandwidth(K)
-    if least < widest:
-        return BandedBlock(K, least)
+    size = max(K.shape[0], 1)
+    widest, best = BAND_TO_ROW * K.nnz / size, None
+    least, narrow = half_bandwidth(K), min(widest, OF_GRID * size**0.5)
     for order in _orders(K, nodes):
+        if least < narrow:
+            break
         width = half_bandwidth(sp.csc_array(K[order][:, order]))
-        if width < widest:
-            return BandedBlock(K, width, order)
-        least = min(least, width)
-    return GeneralBlock(K, least)
+        if width < least:
+            least, best = width, order
+    return BandedBlock(K, least, best) if least < widest else GeneralBlock(K, least)
 
 
 def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Indices]:

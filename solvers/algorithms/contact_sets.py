@@ -15,9 +15,10 @@ Where there is no M, as K has no band or contacts lie all over an area, the chan
 which springs of a stiffness ρ at the contacts of C give (augmented Lagrangian; Hestenes, J. Optim. Theory
 Appl. 4:303–320, 1969),
 
-    (K + ρ A_C A_Cᵀ) dx = A_N λ_N + A_C (ρ y_C − dλ_C),        dλ_C ← dλ_C + ρ (A_Cᵀdx − y_C).
+    (K + ρ A_C A_Cᵀ) dx = A_N λ_N + A_C (ρ y_C − dλ_C),        r = A_Cᵀdx − y_C = 0.
 
-Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; the next product with Q corrects the rest.
+Conjugate gradients in dλ_C from zero: the matrix has the eigenvalues q/(1 + ρq), q those of Q_CC, so that all
+far above 1/ρ count as one. The next product with Q corrects the rest.
 
 In both ways, ever stiffer springs find a first set; where that creeps, an interior point (interior_set.py).
 """
@@ -38,7 +39,7 @@ from .interior_set import interior_set
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact, or more where K is well conditioned
 KEPT = 2.0**40  # ρ in these units times cond(K): the springs keep the last twelve bits of K
-PASSES = 2
+STEPS, ENOUGH = 10, 2.0**-20  # of conjugate gradients; of |y_C|
 GROWTH = 4.0  # of ρ per step; with twice as much the edge lags, and pivoting then needs more sets
 
 
@@ -115,11 +116,20 @@ class ContactSprings:
 
     def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
         """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
-        A, lam, y, rho = self.A, start.lam, start.y, self.rho
-        K, change = self.sprung.block(np.where(C, rho, 0.0)), np.zeros_like(lam)
-        for _ in range(PASSES):
-            closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))
-            change = np.where(C, change + rho * (closed - y), -lam)
+        A, At, lam, y, rho = self.A, self.compliance.At, start.lam, start.y, self.rho
+        K, change = self.sprung.block(np.where(C, rho, 0.0)), np.where(C, 0.0, -lam)
+        closed = At @ K.solve(A @ np.where(C, rho * y, lam))
+        step = r = np.where(C, closed - y, 0.0)
+        size, enough = float(r @ r), ENOUGH**2 * float(y[C] @ y[C])
+        for _ in range(STEPS if size else 0):
+            given = At @ K.solve(A @ step)
+            alpha = size / float(step @ given)
+            change, closed = change + alpha * step, closed - alpha * given
+            r, last = np.where(C, closed - y, 0.0), size
+            size = float(r @ r)
+            if size <= enough:
+                break
+            step = r + size / last * step
         return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
 
     def first_set(self, load: DualLoadCase) -> Mask:
@@ -134,11 +144,11 @@ class ContactSprings:
         rho = float(overlap @ overlap / (overlap @ (self.compliance @ overlap)))
         while rho < self.stiffest and C.any():
             x = self.sprung.block(np.where(C, rho, 0.0)).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
-            C, rho = A.T @ x > load.g, GROWTH * rho
+            C, rho = self.compliance.At @ x > load.g, GROWTH * rho
         return C
 
-    def interior_set(self, load: DualLoadCase) -> tuple[Mask, int]:
-        """The closed contacts of an interior point, (m,), and the factorisations that it took."""
+    def interior_set(self, load: DualLoadCase) -> tuple[Mask, Vector, int]:
+        """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took."""
         if not (load.p > 0).any():
-            return load.p > 0, 0
+            return load.p > 0, np.zeros_like(load.p), 0
         return interior_set(self.compliance, self.sprung, self.diagonal, load.p, self.rho)

@@ -26,7 +26,7 @@ from .newton_system import NewtonSystem, Solved, conjugate_gradients
 THETA = 0.995
 REFINEMENT, PRODUCTS = 1e-3, 20  # of a system, and its conjugate gradients at most
 MAX_STEPS = 60
-SMALLEST = 1e-13  # of the first μ: below, what is undecided remains so
+SMALLEST = 1e-17  # of the first μ: λ is then the start of exact sets
 
 
 class Sprung(NewtonSystem):
@@ -50,8 +50,8 @@ class Sprung(NewtonSystem):
 
     def near(self, b: Vector) -> Vector:
         """About (Q + D)⁻¹ b."""
-        A, rho = self.sprung.A, self.springs
-        return rho * (b - A.T @ self.K.solve(A @ (rho * b)))
+        A, At, rho = self.sprung.A, self.compliance.At, self.springs
+        return rho * (b - At @ self.K.solve(A @ (rho * b)))
 
     def times_H(self, v: Vector) -> Vector:
         return self.compliance @ v + self.D * v
@@ -59,10 +59,10 @@ class Sprung(NewtonSystem):
 
 def interior_set(
     Q: ComplianceProducts, sprung: SprungStiffness, compliance: Vector, p: Vector, rho: float
-) -> tuple[Mask, int]:
-    """The closed contacts of an interior point, (m,), and the factorisations that it took.
+) -> tuple[Mask, Vector, int]:
+    """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took.
 
-    It ends with μ = λᵀy/m at 1e-13 of its first value. Closed is a contact whose λ falls less in the last
+    It ends with μ = λᵀy/m at 1e-17 of its first value. Closed is a contact whose λ falls less in the last
     step than its y, λ⁺/λ > y⁺/y (Tapia's indicators, which have no unit). p (m,) mm : the overlap without
     contact. compliance : about diag(Q).
     """
@@ -75,4 +75,4 @@ def interior_set(
         if point.mu <= enough:
             break
         last, point = point, mehrotra(newton, point)
-    return point.lam / last.lam > point.y / last.y, system.factorisations
+    return point.lam / last.lam > point.y / last.y, point.lam, system.factorisations

@@ -228,14 +228,17 @@ class Sweeps:
             case.factor = case.factor or OpenFactor(self.M)
             at = partial(banded_set, case.factor, case.trial)
         order = self.order
-        floor = largest_rounding(self.compliance, case.load.p[order], case.trial.lam)
+        floor = self._floor(case, case.trial)
         most, dense = int(FIRST_SETS * GROWTH**case.sweeps), self.prepared.assembly.K.dense
         begins = case.sweeps == 0 and not (dense and self.M is None)
         result = block_pivoting(at, case.C, self.compliance, floor, most, PATIENCE if begins else None)
         if begins and result.creeps:
-            if self.M is None or (self.M.whole and not dense):
-                C, factorisations = self.springs.interior_set(case.load)
-                C = C[order]
+            if self.M is None:
+                C, lam, factorisations = self.springs.interior_set(case.load)
+                C, lam = C[order], np.where(C, lam, 0.0)
+                y = self.gaps(lam[:, None], [case.load])[order, 0]
+                case.trial = TrialSolution(lam[order], y, float(abs(y[C]).max(initial=0.0)))
+                at = partial(self.sets.set, case.trial)
             else:
                 C, factorisations = yielding_set(self.M, self.compliance, case.trial), 0
             case.sets += result.passes + factorisations
@@ -248,9 +251,17 @@ class Sweeps:
             lam = lam - ((lam - case.trial.lam) @ change / (step @ change)) * step
         return lam, unchanged
 
+    def _floor(self, case: Case, trial: TrialSolution) -> float:
+        """The rounding of y, mm, below which no sign is wrong: a bound; for products with K⁻¹ an estimate, as
+        the bound adds the forces of contacts that are far from each other.
+        """
+        p = case.load.p[self.order]
+        if self.M is None and not self.prepared.assembly.K.dense:
+            return rounding_of(p, trial.y)
+        return largest_rounding(self.compliance, p, trial.lam)
+
     def _take(self, case: Case, lam: Vector, y: Vector, unchanged: bool, tolerance: float) -> None:
         """Take λ and y, or a part of the step to them, and decide whether the case is settled."""
-        order = self.order
         step, change = lam - case.trial.lam, y - case.trial.y
         slope, curvature = float(step @ case.trial.y), float(step @ change)
         case.last_step = None
@@ -264,7 +275,7 @@ class Sweeps:
         case.stalled = case.stalled + 1 if residual > case.residual / 2 else 0
         case.trial, case.sweeps = TrialSolution(lam, y, missed), case.sweeps + 1
         case.residual = residual
-        floor = largest_rounding(self.compliance, case.load.p[order], lam)
+        floor = self._floor(case, case.trial)
         right = not wrong_signs(case.C, case.trial, self.compliance, floor).any()
         enough = TARGET * tolerance
         if case.stalled:

@@ -11,6 +11,8 @@ smooth fields only, and the face changes contact by contact.
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
 from problems.forms.compliance import DenseCompliance, whole_inverse
@@ -23,6 +25,7 @@ from solvers.options import one_of, require
 
 PRECONDITIONERS = ("band", "face", "none")
 MAX_PRODUCTS = 100_000  # with Q
+FEW = 3000  # contacts of a sparse K for which Q⁻¹ is made
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,11 +61,15 @@ class Mprgp(Method):
         require("mprgp", vars(self), preconditioner=one_of(self.preconditioner, PRECONDITIONERS))
 
     def state(self, problem: Problem) -> _State | Answer:
-        """The state with M and ᾱ, which takes 30 products; a failed answer if there is no M."""
+        """The state with M and ᾱ, which takes 30 products; a failed answer if there is no M.
+
+        M is Q⁻¹ for a dense Q without decay, and for few contacts of a sparse K.
+        """
         near = problem.prepared.approximate_inverse
         Q, diagonal, M = problem.prepared.compliance, near.diagonal, near.M
-        if M is None and isinstance(Q, DenseCompliance):
-            M = whole_inverse(Q)
+        if M is None and (isinstance(Q, DenseCompliance) or len(diagonal) <= FEW):
+            made = DenseCompliance(problem.prepared.Q)
+            diagonal, M = np.diag(made.Q).copy(), whole_inverse(made)
         if M is None:
             return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
         alpha = 1.0 if self.preconditioner == "band" else step_length(Q, diagonal)

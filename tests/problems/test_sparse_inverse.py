@@ -15,7 +15,7 @@ from small_joints import make_joint, make_scene
 from small_problems import make_load, make_prepared
 from sparse_matrices import band_matrix, graph_matrix, renumbered
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix
+from problems.forms.assembly import LoadCase, Matrix
 from problems.forms.prepared import Prepared
 from problems.model.effect import Effect
 from problems.model.effect_tables import effect_class
@@ -115,28 +115,6 @@ def test_it_is_that_of_the_dense_matrices(n: int, half: int, m: int, seed: int) 
     ):
         found = Stiffness([block]).compliance(columns)
         np.testing.assert_allclose(found, Q, rtol=0, atol=1e-13 * abs(Q).max(initial=1.0))
-
-
-@pytest.mark.parametrize("kind", ["band", "renumbered", "general"])
-def test_of_few_contacts_without_coordinates_the_approximate_inverse_is_exact(kind: str) -> None:
-    """Contacts between two unconnected bodies in one K, whatever the numbering: M Q = I."""
-    random, m = np.random.default_rng(5), 40
-    parts = [graph_matrix(random, 800) if kind == "general" else band_matrix(random, 300, 4)] * 2
-    K = sp.csc_array(sp.block_diag(parts))
-    n = K.shape[0]
-    unit = sp.eye_array(n, format="csc")
-    A = sp.csc_array(unit[:, :m] - unit[:, n // 2 : n // 2 + m])
-    if kind == "renumbered":
-        order = random.permutation(n)
-        K, A = renumbered(K, order), sp.csc_array(A[order])
-    prepared = Prepared(Assembly(Stiffness.of(K), A))
-    (block,) = prepared.assembly.K.blocks
-    assert isinstance(block, GeneralBlock if kind == "general" else BandedBlock)
-    approximate = prepared.approximate_inverse
-    Q = A.T @ np.linalg.solve(K.toarray(), A.toarray())
-    product = np.column_stack([approximate.M.product(column) for column in Q[approximate.M.order].T])
-    np.testing.assert_allclose(product[:, approximate.M.order], np.eye(m), atol=1e-10)
-    np.testing.assert_allclose(approximate.diagonal, Q.diagonal(), rtol=1e-12)
 
 
 # --- the coarser model ----------------------------------------------------------------------------------

@@ -172,7 +172,8 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "return self.K.solve(b)": ("return 2 * self.K.solve(b)",),
     },
     "problems/forms/sprung_stiffness.py": {
-        "(A * rho[sprung]) @ A.T": ("A @ A.T",),
+        "self.entries + self.G @ rho": ("self.entries",),
+        "A.data[own] * A.data[other]": ("A.data[own]",),
     },
     "harness/verification/assess.py": {
         "SAFE * near + ": ("",),

@@ -167,6 +167,16 @@ def test_the_duality_gap_may_have_as_many_newton_millimetres_as_the_tolerance_ha
 # Answers.
 
 
+def test_the_condition_is_that_of_the_problem_in_its_units() -> None:
+    """The springs of a sparse K are as stiff as it allows: a diagonal has the condition 1 or 2."""
+    n = 40
+    K = Stiffness.of(sp.csc_array(sp.diags_array(np.exp2(np.arange(n)))))
+    data = Prepared(Assembly(K, sp.eye_array(n, format="csc")))
+    session = opened_session("newton", problem_in(data, "sparse"), 1e-10)
+    assert (session.units.D != 1).any()
+    assert session.units.scaled().prepared.condition <= 2
+
+
 @pytest.mark.parametrize(
     ("name", "form", "bits"),
     [
