@@ -27,6 +27,7 @@ from harness.scene import export as files
 from harness.scene import solution
 from harness.scene import validate as checks
 from harness.scene.solution import Solution
+from harness.scene.stages import StageAnswer
 from harness.series.load_case_source import GapCases
 from harness.series.session import SeriesOptions
 from harness.solving.call_lock import in_turn
@@ -62,6 +63,7 @@ __all__ = [
     "Settings",
     "Solution",
     "Solver",
+    "StageAnswer",
     "SuiteOutcome",
     "check_solver",
     "compare",

@@ -1,18 +1,23 @@
 """The gallery: for each scene a number of independent origin: beam or plate theory, statics, symmetry."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import scipy.linalg as sla
+import scipy.sparse as sp
 from numpy.typing import NDArray
 from small_problems import solve_by_nnls
 
 from harness.scene.solution import solve
 from harness.verification.reference import reference
 from problems.build import load_case, prepared
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
 from problems.scene_files import Scene, read_scene, scene_names
+from problems.stiffness.operator import Stiffness
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
 Array = NDArray[np.float64]
@@ -87,6 +92,25 @@ def test_spring_back() -> None:
     assert released.gap[middle] == pytest.approx(opened, rel=1e-3)
     assert opened == pytest.approx(0.2, rel=1e-3)
     assert released.forces["rivets"] == pytest.approx(2 * held, rel=1e-3)
+
+
+@pytest.mark.parametrize(("name", "largest"), [("outwards", 0.00849), ("from-one-end", 0.109)])
+def test_riveted(name: str, largest: float) -> None:
+    """Rivet after rivet by another solver: what it finds at t is the approach a of f = k a t from then on."""
+    scene = read_scene(f"gallery/riveted-{name}")
+    assert isinstance(scene, JointScene)
+    plain = replace(scene, effects=scene.effects[:1], stages=())
+    data, g = prepared(plain), load_case(plain).g
+    K, A = sla.block_diag(*data.assembly.K.matrices), data.assembly.A
+    weights = sp.csr_array(scene.joint.weights(scene.effects[2].marks(scene.joint)))  # type: ignore[attr-defined]
+    f = np.zeros(len(K))
+    for t in sp.hstack([weights, -weights]).toarray():
+        x, _ = solve_by_nnls(Prepared(Assembly(Stiffness.of(K), A)), LoadCase(f + 30.0 * t, g))
+        K, f = K + 1e5 * np.outer(t, t), f + 1e5 * (t @ x) * t
+    x, _ = solve_by_nnls(Prepared(Assembly(Stiffness.of(K), A)), LoadCase(f, g))
+    answer = solve(scene)
+    np.testing.assert_allclose(answer.x, x, atol=1e-7)
+    assert answer.gap.max() == pytest.approx(largest, rel=2e-3)
 
 
 def test_shifted_support() -> None:
