@@ -116,9 +116,9 @@ def moved_mm(solution: Solution, joint: Joint) -> float:
         x = data.assembly.K.solve(load.f - A @ lam)
         return data.assembly.at_junction(x), load.g - A.T @ x
 
-    *_, last = through(other, answer)
+    *_, (_, _, _, gap) = through(other, answer)
     nodes = min(here.nodes, joint.nodes, key=len)
-    return float(abs(_at(here, solution.gap, nodes) - _at(joint, last.answer, nodes)).max())
+    return float(abs(_at(here, solution.gap, nodes) - _at(joint, gap, nodes)).max())
 
 
 def _at(joint: Joint, values: Vector, places: Matrix) -> Vector:

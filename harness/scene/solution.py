@@ -206,12 +206,11 @@ def solve(
         return like.prepared.assembly.at_junction(like.reference.x), answer
 
     history = []
-    for reached in through(scene, of_stage):
-        answer, stage = reached.answer, locked(reached.scene, reached.approaches[:, 0])
+    for name, part, approaches, answer in through(scene, of_stage):
         history.append(
             StageAnswer(
-                name=reached.name,
-                scene=stage,
+                name=name,
+                scene=locked(part, approaches[:, 0]),
                 x=answer.x,
                 lam=answer.lam,
                 gap=answer.gap,

@@ -140,8 +140,8 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
         return like.prepared.assembly.at_junction(like.reference.x), None
 
     def made() -> storage.Entry:
-        *_, last = through(scene, solve)
-        return {"approaches": last.approaches}, {}
+        *_, (_, _, approaches, _) = through(scene, solve)
+        return {"approaches": approaches}, {}
 
     code = storage.fingerprint([Path(__file__)], within=["harness/verification", "problems"])
     arrays, _ = storage.load_or_make(storage.digest("stages", scene.key, code), made)

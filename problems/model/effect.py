@@ -51,11 +51,6 @@ class Effect(Table):
         return self._lines[k] if self._lines else f"points[{k}]"
 
     @property
-    def stage_words(self) -> tuple[str, ...]:
-        """The name of the stage that sets each point, from the file of the points; empty if it has none."""
-        return self._stages
-
-    @property
     def contacts(self) -> tuple[Pair, ...]:
         """The contacts (a, b) that this effect adds to the joint."""
         return ()

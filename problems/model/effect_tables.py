@@ -94,7 +94,7 @@ class EffectTable:
 
     def unknown_stages(self, names: Sequence[str]) -> Iterator[Fault]:
         """Yield the rows of the file that name none of the stages."""
-        words = enumerate(self.effect.stage_words if self.effect else ())
+        words = enumerate(self.effect._stages if self.effect else ())
         faults = ((k, word, unknown("stage", word, names)) for k, word in words if word not in names)
         yield from self._located((f"points[{k}]", word, allowed) for k, word, allowed in faults)
 

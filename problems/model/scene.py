@@ -114,7 +114,7 @@ class JointScene(Scene):
         loads = [plain(effect) for effect in self.effects if not isinstance(effect, StiffnessEffect)]
         if not self.stages:
             return digest(self.assembly_key, loads)
-        names = [[effect.name, effect.stage_words] for effect in self.effects]
+        names = [[effect.name, effect._stages] for effect in self.effects]
         return digest(self.assembly_key, loads, names, [plain(stage) for stage in self.stages])
 
     @property

@@ -8,8 +8,8 @@ springs. Without a preload they are free of force in s, whose answer is then the
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,23 +23,9 @@ from .stages import Acting, Elements, Plan, acting_effects, of_effect
 Answer = TypeVar("Answer")
 
 
-@dataclass(frozen=True)
-class Reached(Generic[Answer]):
-    """A stage with its answer; its name is empty if the scene has no stages.
-
-    scene : what acts at its end, a scene without stages. approaches : (r, cases) of its springs, mm; see
-    `locked`.
-    """
-
-    name: str
-    scene: JointScene
-    approaches: Matrix
-    answer: Answer
-
-
 def through(
     scene: JointScene, solve: Callable[[JointScene, Matrix], tuple[Matrix, Answer]], cases: int = 1
-) -> Iterator[Reached[Answer]]:
+) -> Iterator[tuple[str, JointScene, Matrix, Answer]]:
     """Go through the stages of a scene, one after another.
 
     Parameters
@@ -54,9 +40,10 @@ def through(
 
     Yields
     ------
-    Reached
-        The stage. It is solved twice if it sets fasteners with a preload, or is the last one and sets some:
-        the second answer counts.
+    (str, JointScene, array (r, cases), answer)
+        A stage: its name; what acts at its end, a scene without stages; the approaches of its springs, mm,
+        see `locked`; and its answer. A stage is solved again with the fasteners that it sets if these have a
+        preload, or if it is the last one.
     """
     joint, locks = scene.joint, _given(scene, cases)
 
@@ -86,7 +73,7 @@ def through(
         if fresh:
             part, approaches = assembled(step, step.elements)
             _, answer = answered(step, part, approaches) if again else (x, answer)
-        yield Reached(step.name, part, approaches, answer)
+        yield step.name, part, approaches, answer
 
 
 def locked(scene: JointScene, approaches: Vector) -> JointScene:

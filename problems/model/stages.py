@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from problems.input.bounded_types import Name, unknown
 
-from .effect import Effect, ForceEffect, SpringEffect
+from .effect import Effect, SpringEffect
 from .interface import AnyJoint
 from .joint import Faults, Table
 
@@ -71,10 +71,11 @@ class Plan:
         put = [
             self._named(k, "on", stage.on) | self._of_files(stage.name) for k, stage in enumerate(self.stages)
         ]
-        if not self.stages:
-            self.steps.append(Acting("", self.everything, frozenset()))
         self.staged = {element for sets in (*taken, *put) for some in sets.values() for element in some}
-        acting = self.everything - self.staged
+        everything = ((number, k) for number, count in enumerate(self.counts) for k in range(max(count, 1)))
+        acting = frozenset(everything) - self.staged
+        if not self.stages:
+            self.steps.append(Acting("", acting, frozenset()))
         for number, (stage, off, on) in enumerate(zip(self.stages, taken, put, strict=True)):
             fresh: Elements = frozenset()
             for reference, elements in off.items():
@@ -87,12 +88,6 @@ class Plan:
                 acting, fresh = acting | elements, fresh | elements
             self.steps.append(Acting(stage.name, acting, fresh))
 
-    @property
-    def everything(self) -> Elements:
-        """The elements of all effects."""
-        counts = enumerate(self.counts)
-        return frozenset((number, k) for number, count in counts for k in range(max(count, 1)))
-
     def _fault(self, number: int, key: str, value: str, allowed: str) -> None:
         self.wrong.append((f"stage[{number}] ({self.stages[number].name}).{key}", value, allowed))
 
@@ -100,7 +95,7 @@ class Plan:
         """The elements whose row in a file names the stage, by the name or kind of the effect."""
         return {
             f"column stage of {effect.name or effect.kind}": frozenset(
-                (number, k) for k, word in enumerate(effect.stage_words) if word == stage
+                (number, k) for k, word in enumerate(effect._stages) if word == stage
             )
             for number, effect in enumerate(self.effects)
         }
@@ -113,10 +108,7 @@ class Plan:
             match = None if reference in names else SLICE.fullmatch(reference)
             name = match[1] if match else reference
             if name not in names:
-                allowed = (
-                    unknown("effect", name, list(names)) if names else 'an effect with name = "…"; none has'
-                )
-                self._fault(number, key, reference, allowed)
+                self._fault(number, key, reference, unknown("effect of this name", name, list(names)))
                 continue
             effect, count = names[name], self.counts[names[name]]
             start, stop = (int(match[2] or 0), int(match[3] or count)) if match else (0, max(count, 1))
@@ -160,11 +152,7 @@ class Plan:
             for number, effect in acting.items():
                 others = [other for k, other in acting.items() if k != number]
                 if isinstance(effect, SpringEffect):
-                    others = [
-                        one
-                        for one in others
-                        if isinstance(one, SpringEffect) or not isinstance(one, ForceEffect)
-                    ]
+                    others = [other for other in others if isinstance(other, SpringEffect)]
                 for fault in effect.faults(self.joint, others):
                     if fault not in told:
                         told.append(fault)

@@ -265,7 +265,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "tuple(approaches[start:stop]": ("tuple(approaches[: stop - start]",),
     },
     "problems/model/stages.py": {
-        "acting = self.everything - self.staged": ("acting = self.everything",),
+        "acting = frozenset(everything) - self.staged": ("acting = frozenset(everything)",),
         "acting -= elements": ("pass",),
         "fresh | elements": ("fresh",),
     },
