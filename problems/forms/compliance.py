@@ -14,7 +14,7 @@ from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.dense_block import product
 from problems.stiffness.operator import Stiffness
 
-from .assembly import Assembly, Matrix, Vector
+from .assembly import Assembly, Indices, Matrix, Vector
 from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, banded_inverse, of_windows
 
 
@@ -83,11 +83,6 @@ def of_dense(Q: DenseCompliance, nodes: Matrix | None) -> ApproximateInverse:
     return ApproximateInverse(None, diagonal)
 
 
-def whole_inverse(Q: DenseCompliance) -> BandedInverse:
-    """Q⁻¹, from one window of all contacts. Raises LinAlgError if Q is not positive definite."""
-    return banded_inverse(Q.Q, Windows(np.arange(len(Q.Q)), len(Q.Q)))
-
-
 def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
     """M from local blocks of the Q of `like`, which has the same contacts: in single precision, or in double
     where some block is not positive definite in that.
@@ -128,10 +123,13 @@ def _from_windows(like: Assembly, windows: Windows, single: bool) -> Approximate
     if local is None:
         return None
     diagonal = np.empty(len(windows.order))
-    for _, start, stop in windows.ranges():
-        line = windows.order[start:stop]
-        diagonal[line] = np.diag(local(line))
-    return ApproximateInverse(of_windows(windows, local), diagonal)
+
+    def noted(window: Indices) -> Matrix:
+        Q_WW = local(window)
+        diagonal[window] = np.diag(Q_WW)
+        return Q_WW
+
+    return ApproximateInverse(of_windows(windows, noted), diagonal)
 
 
 def _single_might_do(assembly: Assembly) -> bool:
@@ -145,7 +143,7 @@ def _single_might_do(assembly: Assembly) -> bool:
 
 def _along_bands(assembly: Assembly) -> Windows | None:
     """Windows along the joint; without coordinates along the bands, a line of contacts per half-bandwidth, or
-    None if a contact couples unknowns that are farther apart than a window.
+    None if a contact couples unknowns of one block that are farther apart than a window.
     """
     if assembly.contact_nodes is not None:
         return Windows.of(assembly.contact_nodes, assembly.m)
@@ -155,8 +153,12 @@ def _along_bands(assembly: Assembly) -> Windows | None:
             widest = max(widest, block.width + 1)
             if block.order is not None:
                 places[rows.start + block.order] = np.arange(rows.start, rows.stop)
-    ends, of_contacts = assembly.A.indptr[:-1], places[assembly.A.indices]
-    first = np.minimum.reduceat(of_contacts, ends)
-    if (np.maximum.reduceat(of_contacts, ends) - first).max() > WINDOW_LINES * widest:
+    A, ends = assembly.A, [rows.stop for rows in assembly.K.slices]
+    of_contacts, contacts = places[A.indices], np.repeat(np.arange(A.shape[1]), np.diff(A.indptr))
+    in_block = len(ends) * contacts + np.searchsorted(ends, A.indices, side="right")
+    begins = np.flatnonzero(np.diff(in_block, prepend=-1))
+    spread = np.maximum.reduceat(of_contacts, begins) - np.minimum.reduceat(of_contacts, begins)
+    first = np.minimum.reduceat(of_contacts, A.indptr[:-1])
+    if spread.max(initial=0) > WINDOW_LINES * widest:
         return None
     return Windows(np.argsort(first, kind="stable"), max(1, assembly.m * widest // assembly.n))

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.forms.banded_inverse import BandedInverse
-from problems.forms.compliance import DenseCompliance, whole_inverse
+from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
 from solvers.base import Answer, LoadCase, Problem, Status, failed
@@ -66,13 +65,14 @@ class Mprgp(Method):
         M is Q⁻¹ for a dense Q without decay, and for few contacts of a sparse K.
         """
         near = problem.prepared.approximate_inverse
-        Q, diagonal, M = problem.prepared.compliance, near.diagonal, near.M
-        if M is None and (isinstance(Q, DenseCompliance) or len(diagonal) <= FEW):
-            made = DenseCompliance(problem.prepared.Q)
-            diagonal, M = np.diag(made.Q).copy(), whole_inverse(made)
+        diagonal, M, m = near.diagonal, near.M, len(near.diagonal)
         if M is None:
-            return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
-        alpha = 1.0 if self.preconditioner == "band" else step_length(Q, diagonal)
+            if not problem.prepared.assembly.K.dense and m > FEW:
+                return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
+            Q = problem.prepared.Q
+            diagonal, M = np.diag(Q).copy(), banded_inverse(Q, Windows(np.arange(m), m))
+        banded = self.preconditioner == "band"
+        alpha = 1.0 if banded else step_length(problem.prepared.compliance, diagonal)
         return _State(problem=problem, diagonal=diagonal, alpha=alpha, M=M)
 
     def _metric(self, ready: _State) -> Diagonal:

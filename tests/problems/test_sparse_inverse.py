@@ -15,7 +15,7 @@ from small_joints import make_joint, make_scene
 from small_problems import make_load, make_prepared
 from sparse_matrices import band_matrix, graph_matrix, renumbered
 
-from problems.forms.assembly import LoadCase, Matrix
+from problems.forms.assembly import Assembly, LoadCase, Matrix
 from problems.forms.prepared import Prepared
 from problems.model.effect import Effect
 from problems.model.effect_tables import effect_class
@@ -115,6 +115,29 @@ def test_it_is_that_of_the_dense_matrices(n: int, half: int, m: int, seed: int) 
     ):
         found = Stiffness([block]).compliance(columns)
         np.testing.assert_allclose(found, Q, rtol=0, atol=1e-13 * abs(Q).max(initial=1.0))
+
+
+@pytest.mark.parametrize("kind", ["band", "renumbered", "general"])
+def test_without_coordinates_windows_go_along_the_bands(kind: str) -> None:
+    """Contacts between two unconnected bodies, whatever the numbering: M Q is nearly I, and the diagonal that
+    of Q. Without a band there is no M.
+    """
+    random, m = np.random.default_rng(5), 290
+    bodies = [graph_matrix(random, 800) if kind == "general" else band_matrix(random, 600, 30) for _ in "ab"]
+    n = bodies[0].shape[0]
+    unit = sp.eye_array(n, format="csc")[:, :m]
+    A = sp.csc_array(sp.vstack([unit, -unit]))
+    if kind == "renumbered":
+        order = random.permutation(n)
+        bodies, A = [renumbered(K, order) for K in bodies], A[np.concatenate([order, n + order])]
+    found = Prepared(Assembly(Stiffness.of(*bodies), sp.csc_array(A))).approximate_inverse
+    assert (found.M is None) == (kind == "general")
+    if found.M is not None:
+        Q = A.T @ np.linalg.solve(sp.block_diag(bodies).toarray(), A.toarray())
+        np.testing.assert_allclose(found.diagonal, Q.diagonal(), rtol=SINGLE)
+        Q = Q[np.ix_(found.M.order, found.M.order)]
+        product = np.column_stack([found.M.product(column) for column in Q])
+        assert abs(np.linalg.eigvals(product) - 1).max() <= 0.1
 
 
 # --- the coarser model ----------------------------------------------------------------------------------
