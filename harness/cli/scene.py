@@ -50,6 +50,8 @@ def solve(
     that answer. If the parts do not meet, this is a linear solve. The error of the finite-element mesh is
     estimated from a coarser one.
 
+    The stages of a scene are solved in turn, and told in a table; --allow-gap decides on the last one.
+
     Two scenes with the same contacts, such as two plans of fasteners, are solved into DIR/first and
     DIR/second and compared: gaps side by side, a map of the difference, the force in each fastener.
     --allow-gap then decides on the second.

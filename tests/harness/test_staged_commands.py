@@ -13,6 +13,9 @@ import pytest
 from rich.console import Console
 from small_joints import two_parts
 
+from harness.measurement.worker import load_cases, scene_to_measure
+from harness.planning.plan import expand
+from harness.planning.suite import read_suite
 from harness.scene.mesh_error import moved_mm
 from harness.scene.solution import solve
 from harness.scene.solve import solve_into
@@ -68,6 +71,18 @@ def test_the_problem_is_the_last_stage(staged: Path, form: Form) -> None:
     assert abs(x - answer.x).max() <= 1e-10
     assert judge(scene, answer.unknowns, form=form).verdict == "within"
     assert last_stage(scene) == last_stage(read_scene(str(staged)))
+
+
+def test_what_is_measured_is_the_last_stage(staged: Path, tmp_path: Path) -> None:
+    suite = tmp_path / "suite.toml"
+    solver = '[[solver]]\nname = "newton"\n'
+    suite.write_text(f'title = "One"\nscenes = ["{staged}"]\ntolerances = [1e-9]\nthreads = [1]\n{solver}')
+    measurements = expand(read_suite(str(suite)))
+    scene = scene_to_measure(measurements)
+    (load,) = load_cases(scene, measurements)
+    assert isinstance(scene, JointScene)
+    assert scene.stages == ()
+    np.testing.assert_array_equal(load.f, opened(read_scene(str(staged))).load.f)
 
 
 def test_export_is_the_last_stage(staged: Path, tmp_path: Path) -> None:
