@@ -25,9 +25,11 @@ from harness.planning.overrides import Overrides
 from harness.results.comparison import Incomparable
 from harness.scene import export as files
 from harness.scene import solution
+from harness.scene import stress as plate_stress
 from harness.scene import validate as checks
 from harness.scene.solution import Solution
 from harness.scene.stages import StageAnswer
+from harness.scene.stress import Stresses
 from harness.series.load_case_source import GapCases
 from harness.series.session import SeriesOptions
 from harness.solving.call_lock import in_turn
@@ -64,6 +66,7 @@ __all__ = [
     "Solution",
     "Solver",
     "StageAnswer",
+    "Stresses",
     "SuiteOutcome",
     "check_solver",
     "compare",
@@ -81,6 +84,7 @@ __all__ = [
     "solve",
     "solve_dual",
     "solve_series",
+    "stresses",
     "validate",
 ]
 
@@ -100,4 +104,5 @@ run_series = in_turn(load_case_series.run_series)
 solve = in_turn(solution.solve)
 solve_dual = in_turn(plain_arrays.solve_dual)
 solve_series = in_turn(plain_arrays.solve_series)
+stresses = in_turn(plate_stress.stresses)
 validate = in_turn(checks.validate)

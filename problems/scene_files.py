@@ -29,7 +29,7 @@ from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
-from problems.model.scene import JointScene, MatricesScene, Scene
+from problems.model.scene import JointScene, MatricesScene, Output, Scene
 from problems.model.stages import Plan, Stage, acting_effects
 from problems.random_scenes import EXAMPLES, SUPERELEMENT_NAME, drawn_table
 
@@ -38,7 +38,7 @@ from .errors import BACKSLASH, Fault, InputError
 FOLDER = Path(__file__).resolve().parent
 SCENES = FOLDER / "scenes"
 ASSEMBLIES = FOLDER / "assemblies"
-KEYS = ("title", "assembly", "joint", "effect", "stage", "matrices")
+KEYS = ("title", "assembly", "joint", "effect", "stage", "output", "matrices")
 TOML_MIB = 10
 #: The motions that are left to a plate, by the number of those that its supports hold.
 LOOSE = ("it moves and tilts freely", "it tilts about a point", "it tilts about a line")
@@ -141,7 +141,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint_path, joint_data = _joint_table(path, data, faults)
     tables = _effect_tables(joint_path, joint_data, faults) if joint_path != path else []
     tables += _effect_tables(path, data, faults)
-    stages = _stages(path, data, faults)
+    stages, output = _stages(path, data, faults), _output(path, data, faults)
     faults += [Fault(str(path), key, value, unknown("key", key, KEYS)) for key, value in data.items()]
 
     for table in tables:
@@ -156,7 +156,16 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
             faults += _of_stages(path, joint_path, joint, effects, stages)
     if faults or joint is None:
         raise InputError(faults)
-    return JointScene(name, title, joint, effects, stages)
+    return JointScene(name, title, joint, effects, stages, output)
+
+
+def _output(path: Path, data: dict[str, Any], faults: list[Fault]) -> Output:
+    """The table [output]; by default nothing more than gaps and displacements is computed."""
+    try:
+        return Output.model_validate(data.pop("output", {}))
+    except ValidationError as error:
+        faults += validation_faults(path, Output, error, "output")
+        return Output()
 
 
 def _stages(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Stage, ...]:

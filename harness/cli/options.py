@@ -47,6 +47,9 @@ ReferenceLimit = Annotated[
         "SECONDS", "For each reference's search.  [default: 60 per thousand contacts, at least 60]", min=0.001
     ),
 ]
+AllowStress = Annotated[
+    float | None, option("MPA", "Fail if a von Mises stress is larger than this, N/mm².", min=0.0)
+]
 AllowGap = Annotated[
     float | None, option("MM", "Fail if a remaining gap is larger than this, and say where.", min=0.0)
 ]

@@ -9,7 +9,16 @@ from typing import Annotated
 import tomlkit
 import typer
 
-from .options import NOTHING_WRITTEN, AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
+from .options import (
+    NOTHING_WRITTEN,
+    AllowGap,
+    AllowStress,
+    FormName,
+    ReferenceLimit,
+    SceneName,
+    error_reporting,
+    option,
+)
 
 STARTER = Path(__file__).with_name("starter.toml")
 STARTER_OF_PARTS = STARTER.with_name("starter-superelements.toml")
@@ -40,6 +49,7 @@ def solve(
     ] = None,
     reference_limit: ReferenceLimit = None,
     allow_gap: AllowGap = None,
+    allow_stress: AllowStress = None,
     refine: Annotated[
         bool, typer.Option("--refine", help="Estimate the mesh error from a finer mesh, too.")
     ] = False,
@@ -65,7 +75,8 @@ def solve(
 
     \b
     Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input,
-                3 --allow-gap cannot be told from what is proven, 4 a gap is larger than --allow-gap,
+                3 --allow-gap or --allow-stress cannot be told from what is proven,
+                4 a gap is larger than --allow-gap, or a stress than --allow-stress,
                 5 the two scenes have other contacts.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
@@ -74,7 +85,16 @@ def solve(
 
         def solved(source: str, folder: Path) -> int:
             return solve_into(
-                source, solver, tolerance, folder, console, reference_limit, form, allow_gap, refine
+                source,
+                solver,
+                tolerance,
+                folder,
+                console,
+                reference_limit,
+                form,
+                allow_gap,
+                refine,
+                allow_stress,
             )
 
         if other is None:

@@ -15,6 +15,7 @@ first on four; the tenth is a sheet over a former, whose contact ends at one nod
 is that of the answer, interpolated. All meshes are solved in the sparse form.
 """
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -34,19 +35,27 @@ from problems.model.stage_answers import locked, through
 
 @dataclass(frozen=True)
 class MeshError:
-    """An estimate. error_mm : of the gaps. grids : number of meshes. order : observed on three, else None."""
+    """An estimate. error_mm : of the gaps. grids : number of meshes. order : observed on three, else None.
+    stress : of the largest von Mises stress, N/mm², from the coarser mesh; None unless it was asked for.
+    """
 
     error_mm: float
     grids: int
     order: float | None = None
+    stress: float | None = None
 
 
-def estimated(solution: Solution, refine: bool = False) -> MeshError | None:
+def estimated(
+    solution: Solution,
+    refine: bool = False,
+    largest_stress: Callable[[JointScene, Vector], float] | None = None,
+) -> MeshError | None:
     """The mesh error of an answer.
 
     None for given matrices and superelements, whose mesh is not known; without contacts or a coarser mesh;
     and where another mesh has no answer. refine : solve on a finer mesh too, with four times the unknowns. r
-    is the smaller one of the two sides of the junction, but above 1.
+    is the smaller one of the two sides of the junction, but above 1. largest_stress : of an answer û to a
+    scene without stages.
     """
     scene = solution.problem.scene
     joint = scene.joint if isinstance(scene, JointScene) else None
@@ -58,13 +67,17 @@ def estimated(solution: Solution, refine: bool = False) -> MeshError | None:
     if not ratios:
         return None
     try:
-        moved = moved_mm(solution, coarse)
-        halved = moved_mm(solution, remeshed(joint, 2.0)) if refine else None
+        moved, last, x = on_mesh(solution, coarse)
+        halved = on_mesh(solution, remeshed(joint, 2.0))[0] if refine else None
     except InputError:  # the answer stands without
         return None
+    stress = None
+    if largest_stress is not None:
+        here = largest_stress(replace(last, joint=joint), solution.unknowns)
+        stress = abs(here - largest_stress(last, x)) / (min(ratios) - 1)
     if halved is None:
-        return MeshError(moved / (min(ratios) - 1), 2)
-    return MeshError(halved * 4 / 3, 3, float(np.log2(moved / halved)) if moved and halved else None)
+        return MeshError(moved / (min(ratios) - 1), 2, stress=stress)
+    return MeshError(halved * 4 / 3, 3, float(np.log2(moved / halved)) if moved and halved else None, stress)
 
 
 def recorded(error: MeshError | None) -> dict[str, Any]:
@@ -94,16 +107,17 @@ def remeshed(joint: Joint, factor: float) -> Joint:
     return joint.model_copy(update={"junction": junction, "part": tuple(parts)})
 
 
-def moved_mm(solution: Solution, joint: Joint) -> float:
-    """max |y_h − y| over the contacts of the coarser of the two meshes, y the gaps on another mesh, mm.
+def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector]:
+    """max |y_h − y| over the contacts of the coarser of the two meshes, y the gaps on another mesh, mm; and
+    the scene there, without stages, with its û.
 
     Raises InputError if the other mesh has no answer.
     """
     scene: Any = solution.scene
     here, other = scene.joint, replace(scene, joint=joint)
 
-    def answer(part: JointScene, approaches: Matrix) -> tuple[Vector, Vector]:
-        """x and the gaps of a stage on the other mesh."""
+    def answer(part: JointScene, approaches: Matrix) -> tuple[Vector, tuple[Vector, JointScene, Vector]]:
+        """x of a stage on the other mesh; its gaps, its scene, and û."""
         gaps = [effect for effect in part.effects if isinstance(effect, GapEffect)]
         rest = [effect for effect in part.effects if not isinstance(effect, GapEffect)]
         one = locked(replace(part, effects=tuple(rest)), approaches[:, 0])
@@ -114,11 +128,11 @@ def moved_mm(solution: Solution, joint: Joint) -> float:
             raise InputError.one(other.name, "mesh", list(joint.junction.nodes), "one with an answer")
         A = data.assembly.A
         x = data.assembly.K.solve(load.f - A @ lam)
-        return data.assembly.at_junction(x), load.g - A.T @ x
+        return data.assembly.at_junction(x), (load.g - A.T @ x, one, x)
 
-    *_, (_, _, _, gap) = through(other, answer)
+    *_, (_, _, _, (gap, last, x)) = through(other, answer)
     nodes = min(here.nodes, joint.nodes, key=len)
-    return float(abs(_at(here, solution.gap, nodes) - _at(joint, gap, nodes)).max())
+    return float(abs(_at(here, solution.gap, nodes) - _at(joint, gap, nodes)).max()), last, x
 
 
 def _at(joint: Joint, values: Vector, places: Matrix) -> Vector:

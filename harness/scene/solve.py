@@ -18,6 +18,7 @@ from harness.terminal import DONE, FAILED
 from harness.terminal.console import ConsoleReporter, show_verdict
 from problems.errors import InputError
 from problems.forms import Form
+from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 
 from . import allowed_gap, mesh_error
@@ -36,11 +37,13 @@ def solve_into(
     form: Form | None = None,
     allow_gap_mm: float | None = None,
     refine: bool = False,
+    allow_stress: float | None = None,
 ) -> int:
     """Solve a scene, write DIR, show the outcome. Returns 0 if the answer is within 1e-7 mm, else 1.
 
-    form : by default see `harness.planning.form_choice`. allow_gap_mm : returns 4 if a remaining
-    gap is larger, 3 if that cannot be told. refine : see `mesh_error`. Raises InputError.
+    form : by default see `harness.planning.form_choice`. allow_gap_mm, allow_stress : returns 4 if a
+    remaining gap or a von Mises stress in N/mm² is larger, 3 if that cannot be told. refine : see
+    `mesh_error`. Raises InputError.
     """
     started = time.perf_counter()
     if not 0 < tolerance < inf:
@@ -48,6 +51,11 @@ def solve_into(
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
     refuse_unwritable(out, scene.sources)
+    stressed = allow_stress is not None or (isinstance(scene, JointScene) and scene.output.stress)
+    if stressed:
+        from . import stress  # only what a scene calls for
+
+        stress.refuse_unusable(allow_stress, scene)
     if refine and not is_of_plates(scene):
         allowed = "left out: the mesh of superelements and of given matrices is not known here"
         raise InputError.one("--refine", "scene", scene.name, allowed)
@@ -61,11 +69,18 @@ def solve_into(
         console.print(text, style=style)
     begun = time.perf_counter()
     with reporter.step("the same joint on another mesh"):
-        mesh = mesh_error.estimated(solution, refine)
+        mesh = mesh_error.estimated(solution, refine, stress.largest_of if stressed else None)
     if mesh is not None:
         solution.seconds["mesh error"] = time.perf_counter() - begun
     record["grid"] = mesh_error.recorded(mesh)
     console.print(f"{record['grid']['said']}.")
+    if stressed:
+        with reporter.step("stresses"):
+            found = stress.stresses(solution)
+            for stage, line in zip(solution.stages, record.get("stages", ()), strict=True):
+                line["largest_stress"] = stress.largest_of(stage.scene, stage.x)
+        arrays |= found.arrays
+        record["stress"] = stress.recorded(found, mesh, allow_stress)
     verdicts = [record["verdict"], *(stage.judgement.verdict for stage in solution.stages)]
     code = DONE if set(verdicts) == {"within"} else FAILED
     if solution.stages:
@@ -78,6 +93,12 @@ def solve_into(
         record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
         verdict = headline(record, arrays)
         code = code or show_verdict(verdict["kind"], [verdict["text"]], console)
+    if stressed:
+        told = [f"{record['stress']['said']}."]
+        if allow_stress is None:
+            console.print(*told)
+        else:
+            code = code or show_verdict(record["stress"]["kind"], told, console)
     with reporter.step("pictures and files"), atomic_output(out, scene.sources) as new:
         from report.writers.answer_report import write
 

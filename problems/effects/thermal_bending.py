@@ -21,6 +21,9 @@ class ThermalBending(PartLoadEffect):
     difference: Annotated[Finite, "K"]
     expansion: Annotated[Positive, "1/K"] = 23e-6
 
+    def free_curvature(self, thickness: Vector) -> Vector:
+        return self.expansion * self.difference / thickness
+
     def load(self, model: PartModel) -> Vector:
         plate = model.plate
         f = np.zeros(plate.size)

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems import storage
-from problems.forms.assembly import Assembly, Indices, LoadCase
+from problems.forms.assembly import Assembly, Indices, LoadCase, Vector
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared, indefinite
 from problems.reporter import SILENT, Reporter
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
@@ -172,6 +172,31 @@ class JointModel:
             i = part.others[np.argsort(self.numbering.places[k][part.others])]
             self.interiors[k] = i, sparse_block(sp.csc_array(part.stiffness()[i][:, i]))
         return self.interiors[k]
+
+    def part_unknowns(self, k: int, x: Vector) -> Vector:
+        """(plate.size,) all unknowns of a part: zero where it is built in, inside it K_ii⁻¹(f_i − K_ij x_j).
+
+        x : (n,) at the junction, or û (N,).
+        """
+        part, place = self.parts[k], self.numbering.places[k]
+        u = np.zeros(part.plate.size)
+        if len(x) == self.numbering.size:
+            u[place >= 0] = x[place[place >= 0]]
+            return u
+        f = np.zeros(part.plate.size)
+        for load in self.part_loads(k):
+            f += load.load(part)
+        u[part.deflections] = x[self.joint.unknowns(self.joint.part[k].name)]
+        i, K_ii = self.interior(k)
+        b = (f - part.stiffness() @ u)[i]
+        u[i] = K_ii.solve(b)
+        u[i] += K_ii.solve(b - K_ii.multiply(u[i]))
+        return u
+
+    def part_loads(self, k: int) -> list[PartLoadEffect]:
+        """The loads of the scene on a part."""
+        name = self.joint.part[k].name
+        return [load for load in self.scene.effects_of(PartLoadEffect) if load.part == name]
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K and A, from the cache or computed now; a dense block of K for each part, or for a range of parts

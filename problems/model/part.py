@@ -125,6 +125,21 @@ class PartLoadEffect(ElementEffect):
         (60,) 0.5296
         """
 
+    def free_curvature(self, thickness: Vector) -> Vector:
+        """The curvature −w_xx = −w_yy, 1/mm, that the free part would take without stress.
+
+        Parameters
+        ----------
+        thickness : (k,) ndarray
+            mm, of k points.
+
+        Returns
+        -------
+        (k,) ndarray
+            Zero, unless the effect is an initial strain.
+        """
+        return np.zeros_like(thickness)
+
 
 GROWTH = 1.2  # of the distance between lines, away from the junction
 PEAK = 2.0  # lines stay to which effects add more than PEAK times the median stiffness beyond the junction

@@ -81,17 +81,24 @@ class Scene(ABC):
         return np.zeros((0, 2))
 
 
+class Output(Table):
+    """The table [output]: what an answer has besides displacements, gaps and forces."""
+
+    stress: bool = False
+
+
 @dataclass(frozen=True)
 class JointScene(Scene):
     """A joint and the effects that the scene includes.
 
-    stages : by default all effects act at once; see `stage_answers.through`.
+    stages : by default all effects act at once; see `stage_answers.through`. output : in no key.
     model : see `problems.build.model_of`; neither copied nor sent to a worker.
     """
 
     joint: AnyJoint
     effects: tuple[Effect, ...] = ()
     stages: tuple[Stage, ...] = ()
+    output: Output = field(default_factory=Output)
     model: Any = field(default=None, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:

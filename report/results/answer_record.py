@@ -71,6 +71,8 @@ def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
         forces = {f"{name}, N": force for name, force in stage["forces_N"].items()}
         least = ROUNDING * max(map(abs, forces.values()))
         forces = {name: force if abs(force) > least else 0.0 for name, force in forces.items()}
+        if "largest_stress" in stage:
+            line["stress, N/mm²"] = stage["largest_stress"]
         verdict = {"verdict": VERDICTS[stage["exceeded"]]} if "exceeded" in stage else {}
         lines.append(line | {"closed": stage["closed"]} | forces | verdict)
     table = pd.DataFrame(lines)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness import load_scene, own_matrices, solve
-from harness.scene.mesh_error import estimated, moved_mm, recorded, remeshed
+from harness.scene.mesh_error import estimated, on_mesh, recorded, remeshed
 from harness.scene.solution import Solution
 from problems.model.scene import JointScene
 
@@ -24,7 +24,7 @@ def strips(*effects: dict[str, object]) -> Solution:
 
 def finest(found: Solution, factor: float) -> float:
     """How far the gaps are from those of a mesh of `factor` times as many lines."""
-    return moved_mm(found, remeshed(found.problem.scene.joint, factor))
+    return on_mesh(found, remeshed(found.problem.scene.joint, factor))[0]
 
 
 PLANS = {

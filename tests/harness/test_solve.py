@@ -184,7 +184,13 @@ def test_only_what_is_called_for_is_imported(solved: tuple[dict[str, Any], Path]
         "problems.effects.initial_gap",
         "problems.effects.pressure",
     }
-    assert not modules & {"solvers.methods.ipm", "solvers.methods.gi", "solvers.registry", "bokeh"}
+    assert not modules & {
+        "problems.model.stress",
+        "solvers.methods.ipm",
+        "solvers.methods.gi",
+        "solvers.registry",
+        "bokeh",
+    }
 
 
 def test_own_matrices_without_coordinates(tmp_path: Path) -> None:

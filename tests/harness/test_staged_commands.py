@@ -16,7 +16,7 @@ from small_joints import two_parts
 from harness.measurement.worker import load_cases, scene_to_measure
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from harness.scene.mesh_error import moved_mm
+from harness.scene.mesh_error import on_mesh
 from harness.scene.solution import solve
 from harness.scene.solve import solve_into
 from harness.terminal import FAILED, GAP_EXCEEDED
@@ -138,7 +138,7 @@ def test_mesh_error_goes_through_the_stages(staged: Path) -> None:
     answer = solve(str(staged))
     assert isinstance(answer.scene, JointScene)
     assert isinstance(answer.scene.joint, Joint)
-    assert moved_mm(answer, answer.scene.joint) <= 1e-9
+    assert on_mesh(answer, answer.scene.joint)[0] <= 1e-9
 
 
 ROOT = Path(__file__).parents[2]

@@ -264,6 +264,15 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "again or effect.preload != 0": ("again",),
         "tuple(approaches[start:stop]": ("tuple(approaches[: stop - start]",),
     },
+    "problems/model/stress.py": {
+        "of_xx - bent": ("of_xx",),
+        "thickness / 2 / (1 - nu**2)": ("thickness / (1 - nu**2)",),
+        "of_xx + nu * of_yy": ("of_xx - nu * of_yy", "of_xx"),
+        "(1 - nu) * of_xy": ("of_xy",),
+        "thickness[((low <= places)": ("thickness[((low > places)",),
+        "max(1.0, 1.5 * (1 - nu)) * s**2": ("0.001 * s**2",),
+        "x**2 - x * y + y**2": ("x**2 + y**2",),
+    },
     "problems/model/stages.py": {
         "acting = frozenset(everything) - self.staged": ("acting = frozenset(everything)",),
         "acting -= elements": ("pass",),
@@ -320,5 +329,6 @@ TESTS = {
     "problems/model/joint_model.py": ("problems/test_stages.py",),
     "problems/model/stage_answers.py": ("problems/test_stages.py",),
     "problems/model/stages.py": ("problems/test_stages.py",),
+    "problems/model/stress.py": ("problems/test_stress.py",),
     "solvers/kkt.py": ("proofs/test_terms_verdict.py",),
 }

@@ -1,0 +1,186 @@
+"""The bending stresses of a scene's plates, with the error that is proven for them.
+
+A bound b on |x_i − x*_i| is proven by an energy: b ≥ ‖x − x*‖_K max √(K⁻¹)_ii ≥ ‖x − x*‖_K / √(min k_ii). So
+‖x − x*‖_K ≤ b √(min k_ii), which is also that of all unknowns of the parts, and no stress is off by more than
+its sensitivity (problems/model/stress.py) times that. To an answer of a solver its distance from the
+reference is added. The rounding of the unknowns inside a part is not counted; the error of the mesh is not,
+either (mesh_error.py).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from problems.build import model_of
+from problems.errors import InputError
+from problems.forms.assembly import Matrix, Vector
+from problems.model.joint import Joint
+from problems.model.joint_model import JointModel
+from problems.model.positions import Positions
+from problems.model.scene import JointScene, Scene
+from problems.model.stress import PartStress, part_stress
+
+from .mesh_error import MeshError
+from .solution import Solution
+
+NONE = "left out: only plates have stresses; a stiffness of nodes alone tells none"
+
+
+@dataclass(frozen=True)
+class Stresses:
+    """The stresses of all parts.
+
+    Parameters
+    ----------
+    parts : tuple of PartStress
+        Those of each part, N/mm².
+    errors : tuple of array
+        (k,) N/mm², of each part: how far its stresses are from the exact ones at most.
+    """
+
+    parts: tuple[PartStress, ...]
+    errors: tuple[Vector, ...]
+
+    @cached_property
+    def largest(self) -> dict[str, Any]:
+        """The largest von Mises stress where no force at a point is near: part, x, y, value, error."""
+        best: dict[str, Any] = {}
+        for part, error in zip(self.parts, self.errors, strict=True):
+            value = np.where(part.near_force, -1.0, part.von_mises)
+            k = int(value.argmax())
+            if value[k] > best.get("von_mises", -1.0):
+                x, y = part.places[k].tolist()
+                best = {"part": part.part, "x": x, "y": y}
+                best |= {"von_mises": float(value[k]), "error": float(error[k])}
+        return best
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """The arrays of DIR/solution.npz; part is its number."""
+        counts = [len(part.places) for part in self.parts]
+        return {
+            "stress_part": np.arange(len(counts)).repeat(counts),
+            "stress_places": np.concatenate([part.places for part in self.parts]),
+            "stress": np.concatenate([part.components for part in self.parts]),
+            "stress_error": np.concatenate(self.errors),
+            "stress_near_force": np.concatenate([part.near_force for part in self.parts]),
+        }
+
+    def exceeded(self, allowed: float) -> bool | None:
+        """Whether a von Mises stress away from forces at points is larger; None if it cannot be told."""
+        pairs = zip(self.parts, self.errors, strict=True)
+        told = [(part.von_mises[~part.near_force], e[~part.near_force]) for part, e in pairs]
+        if any((value - e > allowed).any() for value, e in told):
+            return True
+        return None if any((value + e > allowed).any() for value, e in told) else False
+
+
+def recorded(found: Stresses, mesh: MeshError | None, allowed: float | None) -> dict[str, Any]:
+    """The entry `stress` of solution.json: the largest von Mises stress, and a sentence with a verdict.
+
+    kind : "pass", "fail", or "" without a limit or if it cannot be told.
+    """
+    largest = found.largest
+    if not largest:
+        return {"kind": "", "said": "Forces at points act near all elements: no stress is told"}
+    at = f"{largest['part']}, on both faces, x = {largest['x']:.4g} mm, y = {largest['y']:.4g} mm"
+    said = (
+        f"largest von Mises stress {largest['von_mises']:.3g} N/mm², {at}; proven to {largest['error']:.1e}"
+    )
+    grid = None if mesh is None else mesh.stress
+    said += ", mesh error not known" if grid is None else f", mesh error about {grid:.1g} N/mm²"
+    record: dict[str, Any] = {"largest": largest, "mesh_error": grid, "kind": ""}
+    if allowed is None:
+        return record | {"said": said[0].upper() + said[1:]}
+    exceeded = found.exceeded(allowed)
+    verdict = {None: "CANNOT BE TOLD", True: "FAIL", False: "PASS"}[exceeded]
+    if grid is not None and abs(largest["von_mises"] - allowed) <= grid:
+        said += ", closer to the limit than the mesh can tell"
+    kind = {None: "", True: "fail", False: "pass"}[exceeded]
+    said = f"{verdict}: limit {allowed:g} N/mm²; {said}"
+    return record | {"allowed": allowed, "exceeded": exceeded, "kind": kind, "said": said}
+
+
+def refuse_unusable(allowed: float | None, scene: Scene) -> None:
+    """Raise InputError unless it is a stress, or None, and the scene has plates."""
+    if allowed is not None and not 0 < allowed < np.inf:
+        raise InputError.one("--allow-stress", "stress, N/mm²", allowed, "must be positive and finite")
+    refuse_without_plates(scene)
+
+
+def largest_of(scene: JointScene, x: Vector) -> float:
+    """The largest von Mises stress away from forces at points, N/mm². x : as in `stresses_of`."""
+    parts = stresses_of(scene, x)
+    return float(Stresses(parts, tuple(part.sensitivity for part in parts)).largest.get("von_mises", 0.0))
+
+
+def stresses(solution: Solution) -> Stresses:
+    """The bending stresses of a solution's plates, after its last stage.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of a joint of plates.
+
+    Returns
+    -------
+    Stresses
+        Of each part at the 2 × 2 Gauss points of its elements, N/mm², on the face in the direction of
+        positive displacements; on the other face they have the other sign.
+
+    Raises
+    ------
+    InputError
+        If the parts are superelements, or matrices were given.
+
+    Examples
+    --------
+    >>> from rivetbench import solve, stresses
+    >>> of_sheet = stresses(solve("gallery/heavy-sheet-on-tool")).largest
+    >>> print(f"{of_sheet['von_mises']:.2f} N/mm², {of_sheet['part']}")
+    2.13 N/mm², sheet
+    """
+    problem, reference = solution.problem, solution.problem.reference
+    parts = stresses_of(problem.scene, solution.unknowns)
+    assembly = problem.prepared.assembly
+    softest = float(np.min(assembly.at_junction(assembly.K.diagonal)))
+    energy = reference.bound_mm * np.sqrt(softest)
+    errors = [part.sensitivity * energy for part in parts]
+    if not solution.from_reference:
+        exact = stresses_of(problem.scene, reference.x)
+        for part, other, error in zip(parts, exact, errors, strict=True):
+            error += np.sqrt(3) * abs(part.components - other.components).sum(axis=1)
+    return Stresses(parts, tuple(errors))
+
+
+def stresses_of(scene: Scene, x: Vector) -> tuple[PartStress, ...]:
+    """The stresses of each part. x : (n,) at the junction or û (N,), mm. Raises InputError as `stresses`."""
+    refuse_without_plates(scene)
+    assert isinstance(scene, JointScene)
+    model = model_of(scene)
+    assert isinstance(model, JointModel)
+    return tuple(
+        part_stress(name, part, model.part_loads(k), model.part_unknowns(k, x), _forces(scene, name))
+        for k, (name, part) in enumerate(zip(scene.joint.names, model.parts, strict=True))
+    )
+
+
+def refuse_without_plates(scene: Scene) -> None:
+    """Raise InputError if a scene has no plates."""
+    if not isinstance(scene, JointScene) or not isinstance(scene.joint, Joint):
+        raise InputError.one("stress", "scene", scene.name, NONE)
+
+
+def _forces(scene: JointScene, part: str) -> Matrix:
+    """(k, 2) the places of forces at points of a part, mm."""
+    held = [
+        point for effect in scene.stiffness_effects if effect.part == part for point in effect.held_points
+    ]
+    pressed = [
+        effect.marks(scene.joint)
+        for effect in scene.effects_of(Positions)
+        if effect.in_holes and part in effect.parts(scene.joint)
+    ]
+    return np.concatenate([np.reshape(held, (-1, 2)), *pressed])

@@ -1,0 +1,199 @@
+"""Stresses of plates against closed forms (Timoshenko and Woinowsky-Krieger 1959), and their errors."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from commands import harness
+from scipy.sparse.linalg import spsolve
+
+from harness.scene.solution import solve
+from harness.scene.stress import stresses, stresses_of
+from problems.effects.local_thickness import LocalThickness
+from problems.effects.thermal_bending import ThermalBending
+from problems.errors import InputError
+from problems.forms.assembly import Mask, Vector
+from problems.input.text_files import read_text
+from problems.model.part import PartModel
+from problems.model.plate import Plate, line_loads
+from problems.model.stress import PartStress, part_stress
+from problems.scene_files import SCENES, read_scene
+
+NOWHERE = np.zeros((0, 2))
+E, NU, T, SIDE, Q = 70e3, 0.3, 2.0, 100.0, 0.01
+
+
+def square(elements: int) -> Plate:
+    lines = np.linspace(0.0, SIDE, elements + 1)
+    return Plate(lines, lines, T, E, NU)
+
+
+def bent(plate: Plate, f: Vector, held: Mask, effects: tuple[LocalThickness, ...] = ()) -> Vector:
+    """The unknowns under a load, some of them held at zero."""
+    u, free = np.zeros(plate.size), np.flatnonzero(~held)
+    K = sp.csc_array(PartModel(plate, effects, range(len(plate.y))).stiffness())
+    u[free] = spsolve(K[free][:, free], f[free])
+    return u
+
+
+def of_border(plate: Plate, clamped: bool) -> Mask:
+    """The unknowns that a simple support, or a clamp, of all four edges holds."""
+    held = np.zeros((len(plate.y), 2, len(plate.x), 2), dtype=bool)
+    for edge in (0, -1):
+        held[edge, 0] = True
+        held[:, :, edge, 0] = True
+        if clamped:
+            held[edge] = True
+            held[:, :, edge] = True
+    return held.ravel()
+
+
+def pressed(plate: Plate, clamped: bool) -> PartStress:
+    f = Q * np.kron(line_loads(plate.y, -np.inf, np.inf)[0], line_loads(plate.x, -np.inf, np.inf)[0])
+    u = bent(plate, f, of_border(plate, clamped))
+    return part_stress("plate", PartModel(plate, (), range(len(plate.y))), (), u, NOWHERE)
+
+
+def near(stress: PartStress, x: float, y: float, count: int = 4) -> Vector:
+    """The mean of the components at the points that are nearest to a place."""
+    order = np.argsort(((stress.places - (x, y)) ** 2).sum(axis=1), kind="stable")
+    return np.asarray(stress.components[order[:count]].mean(axis=0))
+
+
+@pytest.mark.parametrize(("clamped", "moment"), [(False, 0.0479), (True, 0.02291)])
+def test_a_square_plate_under_pressure_at_its_middle(clamped: bool, moment: float) -> None:
+    """Positive displacements stretch the top face where the plate bulges. Of the clamped plate, 0.0231 in the
+    book, by R. Taylor and S. Govindjee, Commun. Numer. Meth. Engng 20:757–765 (2004).
+    """
+    exact = 6 * moment * Q * SIDE**2 / T**2
+    x, y, shear = near(pressed(square(16), clamped), SIDE / 2, SIDE / 2)
+    assert x == pytest.approx(exact, rel=6e-3)
+    assert y == pytest.approx(x, rel=1e-9)
+    assert abs(shear) < 1e-9 * exact
+
+
+def test_a_clamped_square_plate_at_the_middle_of_an_edge() -> None:
+    """σ = −6 · 0.0513 q a²/t², from the two rows of Gauss points beside the edge."""
+    exact, errors = -6 * 0.0513 * Q * SIDE**2 / T**2, []
+    for elements in (8, 16, 32):
+        stress = pressed(square(elements), clamped=True)
+        first, second = np.unique(stress.places[:, 0])[:2]
+        a, b = (near(stress, x, SIDE / 2, 2)[0] for x in (first, second))
+        errors.append(abs((a - first * (b - a) / (second - first)) / exact - 1))
+    assert errors[-1] < 4e-3
+    assert errors[-1] < errors[0]
+
+
+def test_a_cantilever_is_exact() -> None:
+    """σ_xx = 6 P (L − x)/(b t²) without Poisson's ratio: the element has this curvature."""
+    plate = Plate(np.linspace(0, 200.0, 6), np.linspace(0, 20.0, 3), T, E, 0.0)
+    held = np.zeros((len(plate.y), 2, len(plate.x), 2), dtype=bool)
+    held[:, :, 0] = True
+    force = 3.0
+    f = np.kron(line_loads(plate.y, -np.inf, np.inf)[0] / 20.0, np.eye(2 * len(plate.x))[-2]) * force
+    stress = part_stress("strip", PartModel(plate, (), range(3)), (), bent(plate, f, held.ravel()), NOWHERE)
+    exact = -6 * force * (200.0 - stress.places[:, 0]) / (20.0 * T**2)
+    np.testing.assert_allclose(stress.components[:, 0], exact, rtol=1e-9)
+    np.testing.assert_allclose(stress.components[:, 1:], 0.0, atol=1e-9 * abs(exact).max())
+    np.testing.assert_allclose(stress.von_mises, abs(exact), rtol=1e-9)
+
+
+@pytest.mark.parametrize("padded", [False, True])
+def test_a_warm_panel_that_is_free_has_no_stress(padded: bool) -> None:
+    """Three deflections hold it; on a pad that covers it, too."""
+    plate = square(6)
+    pad = LocalThickness(kind="local_thickness", part="p", thickness=3.0, x=(0, SIDE), y=(0, SIDE))
+    model = PartModel(plate, (pad,) * padded, range(7))
+    warm = ThermalBending(kind="thermal_bending", part="p", difference=40.0)
+    held = np.zeros((7, 2, 7, 2), dtype=bool)
+    held[0, 0, 0, 0] = held[0, 0, -1, 0] = held[-1, 0, 0, 0] = True
+    u = bent(plate, warm.load(model), held.ravel(), model.effects)
+    cold = part_stress("p", model, (), u, NOWHERE)
+    assert part_stress("p", model, (warm,), u, NOWHERE).von_mises.max() < 1e-7 * cold.von_mises.max()
+
+
+@pytest.mark.parametrize("pad", [None, 1.0, 4.0])
+def test_no_error_changes_a_stress_by_more_than_its_energy_allows(pad: float | None) -> None:
+    """Neither a random one, nor that which changes the stress at a place the most; and that comes near."""
+    plate, random = square(4), np.random.default_rng(0)
+    pads = (
+        ()
+        if pad is None
+        else (LocalThickness(kind="local_thickness", part="p", thickness=pad, x=(0, 30), y=(0, 100)),)
+    )
+    model, held = PartModel(plate, pads, range(5)), of_border(plate, clamped=False)
+    K, free = sp.csc_array(model.stiffness()), np.flatnonzero(~held)
+
+    def changed(e: Vector) -> Vector:
+        stress = part_stress("p", model, (), e, NOWHERE)
+        largest = np.maximum(abs(stress.components).max(axis=1), stress.von_mises)
+        return np.asarray(largest / (stress.sensitivity * np.sqrt(e @ K @ e)))
+
+    units = np.eye(plate.size)[free]
+    operators = np.array([part_stress("p", model, (), unit, NOWHERE).components for unit in units])
+    shares = []
+    for k in range(40):
+        e = np.zeros(plate.size)
+        for values in (random.standard_normal(len(free)), spsolve(K[free][:, free], operators[:, k, k % 2])):
+            e[free] = values
+            shares.append(changed(e).max())
+    assert 0.05 < max(shares) <= 1.0
+
+
+@pytest.mark.parametrize("name", ["three-part-stack", "padded-panel", "heavy-sheet-on-tool"])
+def test_all_forms_have_the_same_stresses(name: str) -> None:
+    dense, sparse = (stresses(solve(f"gallery/{name}", form=form)) for form in ("dual", "sparse"))
+    largest = max(part.von_mises.max() for part in sparse.parts)
+    for one, other in zip(dense.parts, sparse.parts, strict=True):
+        np.testing.assert_allclose(one.components, other.components, rtol=0, atol=1e-6 * largest)
+
+
+def test_the_error_of_a_rough_answer_is_said() -> None:
+    """ADMM's answer to 1e-4: its stresses are as near to the exact ones as is said."""
+    scene = "gallery/three-part-stack"
+    exact, rough = solve(scene), solve(scene, "scs", tolerance=1e-4, form="dual")
+    said = stresses(rough)
+    for one, other, error in zip(stresses(exact).parts, said.parts, said.errors, strict=True):
+        assert (abs(one.components - other.components).max(axis=1) <= error).all()
+        assert (abs(one.von_mises - other.von_mises) <= error).all()
+        assert error.max() > 1e-9
+
+
+def test_forces_at_points_are_named() -> None:
+    answer = solve("gallery/installed-fasteners")
+    (part, *_) = stresses_of(answer.problem.scene, answer.unknowns)
+    assert part.near_force.any()
+    assert not part.near_force.all()
+
+
+def test_superelements_have_none() -> None:
+    with pytest.raises(InputError, match="only plates have stresses"):
+        stresses_of(read_scene("drawn/superelements/0"), np.zeros(1))
+
+
+@pytest.mark.parametrize(("allowed", "code", "word"), [(50, 0, "PASS"), (0.5, 4, "FAIL"), (0, 2, "positive")])
+def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str) -> None:
+    done = harness("solve", "gallery/heavy-sheet-on-tool", "--allow-stress", allowed, "--out", tmp_path / "a")
+    assert done.exit_code == code
+    assert word in done.output
+    if code != 2:
+        record = json.loads((tmp_path / "a/solution.json").read_text("utf-8"))
+        assert record["stress"]["largest"]["von_mises"] == pytest.approx(2.13, abs=0.005)
+        assert record["stress"]["mesh_error"] > 0
+
+
+def test_a_scene_asks_for_stresses(tmp_path: Path) -> None:
+    text = read_text(SCENES / "gallery/heavy-sheet-on-tool.toml", "file", 1, strict=True)
+    (tmp_path / "asked.toml").write_text(f"{text}\n[output]\nstress = true\n", "utf-8")
+    assert read_scene(str(tmp_path / "asked.toml")).key == read_scene("gallery/heavy-sheet-on-tool").key
+    done = harness("solve", tmp_path / "asked.toml", "--out", tmp_path / "a")
+    assert "Largest von Mises stress 2.13 N/mm², sheet" in done.output.replace("\n", " ")
+
+
+def test_what_is_wrong_with_output_is_said(tmp_path: Path) -> None:
+    text = read_text(SCENES / "gallery/heavy-sheet-on-tool.toml", "file", 1, strict=True)
+    (tmp_path / "wrong.toml").write_text(f"{text}\n[output]\nstres = true\n", "utf-8")
+    with pytest.raises(InputError, match=r"output\.stres"):
+        read_scene(str(tmp_path / "wrong.toml"))
