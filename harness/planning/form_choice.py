@@ -55,8 +55,11 @@ class Size:
         return self.dense_peak_mib if form in DENSE_FORMS else self.sparse_peak_mib
 
 
-def size_of(scene: Scene) -> Size | None:
-    """The size of a joint of plates or of sparse matrices; None for dense arrays, already in memory."""
+def size_of(scene: Scene, stored: bool = True) -> Size | None:
+    """The size of a joint of plates or of sparse matrices; None for dense arrays, already in memory.
+
+    stored : whether to look for the dense matrices in the cache.
+    """
     models = models_of(scene)
     if isinstance(scene, JointScene) and isinstance(scene.joint, Joint):
         size = _of_joint(scene, scene.joint)
@@ -64,7 +67,7 @@ def size_of(scene: Scene) -> Size | None:
         size = _of_given(assembly)
     else:
         return None
-    usable = isinstance(scene, JointScene) and size.dense_peak_mib <= physical_memory_mib()
+    usable = stored and isinstance(scene, JointScene) and size.dense_peak_mib <= physical_memory_mib()
     return replace(size, stored=usable and all(model.built for model in models))
 
 
@@ -134,7 +137,7 @@ def chosen_form(scene: Scene, taken: Sequence[Form], form: Form | None, cases: i
     """
     if form is not None and form not in taken:
         raise InputError.one("--form", "form", form, f"the solver takes {' and '.join(taken)}")
-    size = size_of(scene)
+    size = size_of(scene, stored=form is None)
     choice = _by_rule(size, taken, cases) if form is None else Choice(form)
     refuse_what_cannot_fit(scene, size, choice.form)
     return choice

@@ -131,7 +131,7 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
     """
     if not (isinstance(scene, JointScene) and scene.stages):
         return scene
-    form: Form = "sparse" if size_of(scene) else "dual"
+    form: Form = "sparse" if size_of(scene, stored=False) else "dual"
     like: ReferenceProblem | None = None
 
     def solve(part: JointScene, approaches: Matrix) -> tuple[Vector, None]:
