@@ -23,8 +23,8 @@ MOST_FAULTS = 100  # shown at once
 LONGEST_LINE = 200  # characters of a file quoted in a message
 
 
-def option(metavar: str, help: str, **limits: Any) -> Any:
-    return typer.Option(metavar=metavar, help=help, **limits)
+def option(metavar: str, help: str, *names: str, **limits: Any) -> Any:
+    return typer.Option(*names, metavar=metavar, help=help, **limits)
 
 
 def table_options(columns: str | None, missing: list[str] | None) -> TableOptions:

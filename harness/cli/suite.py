@@ -26,10 +26,10 @@ def run(
     ] = None,
     with_: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "NAME==VERSION",
+            "Only this library, in this version; NAME alone: as installed here. Repeatable.",
             "--with",
-            metavar="NAME==VERSION",
-            help="Only this library, in this version; NAME alone: as installed here. Repeatable.",
         ),
     ] = None,
     form: Annotated[
@@ -40,8 +40,7 @@ def run(
         option("TOL", "Tolerance passed to the solvers, repeatable; auto: the loosest decade that suffices."),
     ] = None,
     setting: Annotated[
-        list[str] | None,
-        typer.Option("--option", metavar="SOLVER.KEY=VALUE", help="An option of a solver. Repeatable."),
+        list[str] | None, option("SOLVER.KEY=VALUE", "An option of a solver. Repeatable.", "--option")
     ] = None,
     repeat: Annotated[int | None, option("N", "Number of repeats.", min=1)] = None,
     threads: Annotated[

@@ -1,6 +1,5 @@
 """Checks a scene without solving it: its parts and effects, its size and memory, the digits of a given K."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -128,9 +127,9 @@ def _superelements(scene: JointScene, console: Console) -> None:
     _matrices(scene, console)
 
 
-def print_unusual(scene: Scene, console: Console, notes: Sequence[str] = ()) -> None:
-    """Print what may be, but is rarely meant. notes : on load cases."""
-    for sentence in (*(scene.unusual if isinstance(scene, JointScene) else ()), *notes):
+def print_unusual(scene: Scene, console: Console) -> None:
+    """Print what may be, but is rarely meant."""
+    for sentence in scene.unusual if isinstance(scene, JointScene) else ():
         console.print(Text(f"{sentence}.", style="yellow"))
 
 

@@ -14,10 +14,8 @@ ROUNDING = 2.0**-44  # of the largest value: what is smaller is rounding
 def significant(value: object, digits: int = 3) -> str:
     """0.0912, 12.3, 1230; with a power of ten (4.1e-9) below 0.001 and from 100 000."""
     number = as_number(value)
-    if number is None:
-        return MISSING
-    if number == 0:
-        return "0"
+    if not number:
+        return power(number)
     rounded = float(f"{number:.{digits - 1}e}")
     exponent = math.floor(math.log10(abs(rounded)))
     if not -3 <= exponent < 5:
