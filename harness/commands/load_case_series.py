@@ -17,6 +17,7 @@ from harness.scene.allowed_gap import check_series, refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
 from harness.series.session import Job, SeriesOptions
+from harness.series.staged import last_scene
 from harness.solving.call_lock import keeps_threads
 from harness.terminal import DONE, NOTHING_JUDGED
 from harness.terminal.console import console_of
@@ -129,11 +130,13 @@ def run_series(
     read = read_scene(source)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
     wanted = options.form or (earlier if earlier in made.forms else None)
+    if isinstance(read, JointScene) and read.stages:
+        _refuse_with_stages(read, sweep, options.plugin)
     count = swept(read, sweep).count if sweep else cases.count or RANDOM
     choice = chosen_form(read, made.forms, wanted, count)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
-    chosen: LoadCases = swept(read, sweep, choice.form) if sweep else cases.of(read, choice.form)
+    chosen: LoadCases = swept(read, sweep, choice.form) if sweep else cases.of(last_scene(read), choice.form)
     for sentence in (*(read.unusual if isinstance(read, JointScene) else ()), *chosen.notes):
         reporter.say(sentence)
     threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
@@ -150,3 +153,12 @@ def run_series(
 
         report = write(directory)
     return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], report)
+
+
+def _refuse_with_stages(scene: JointScene, sweep: Sequence[str], plugin: Path | None) -> None:
+    """Raise InputError for what does not go through stages."""
+    faults = [Fault("--sweep", "sweep", one, f"left out: {scene.name} has stages") for one in sweep]
+    if plugin:
+        faults.append(Fault("--plugin", "plugin", str(plugin), f"left out: {scene.name} has stages"))
+    if faults:
+        raise InputError(faults)

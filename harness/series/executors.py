@@ -27,8 +27,9 @@ from problems.build import prepared
 from problems.errors import Fault, InputError
 
 from .session import BLOCK, Job, Result, SeriesSession
+from .staged import StagedSession, session_of
 
-_sessions: dict[str, SeriesSession] = {}
+_sessions: dict[str, SeriesSession | StagedSession] = {}
 
 
 @contextmanager
@@ -42,7 +43,7 @@ def results_of(
         return
     if scheduler is None:
         with ConsoleReporter(console).step("opening the assembly, preparing the solver"):
-            session = SeriesSession(job)
+            session = session_of(job)
         yield session.solve(remaining)
         return
     with workers(scheduler, console) as (executor, count):
@@ -122,7 +123,7 @@ def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
         return [result for some in solve_isolated(job, numbers) for result in some]
     if job.key not in _sessions:
         _sessions.clear()
-        _sessions[job.key] = SeriesSession(job)
+        _sessions[job.key] = session_of(job)
     session = _sessions[job.key]
     session.job = job  # holds these cases
     return [result for block in session.solve(numbers) for result in block]

@@ -27,6 +27,7 @@ from report.document.numbers import counted
 
 from .executors import results_of
 from .session import Job, Result
+from .staged import last_scene
 
 MAX_FAULTS = 10  # named at once
 
@@ -108,12 +109,13 @@ def metadata(job: Job) -> dict[str, Any]:
 
 def record_contacts(job: Job, directory: Path) -> None:
     """The positions of contacts and fasteners, for the figures."""
-    assembly = prepared(job.scene, form=job.form).assembly
+    scene = last_scene(job.scene)
+    assembly = prepared(scene, form=job.form).assembly
     arrays = {"m": np.array(assembly.m)}
     if assembly.contact_nodes is not None:
         arrays["contact_nodes"] = assembly.contact_nodes
-    if isinstance(job.scene, JointScene):
-        arrays["fasteners"] = job.scene.marks()
+    if isinstance(scene, JointScene):
+        arrays["fasteners"] = scene.marks()
     series_file.write_contacts(directory, arrays)
 
 

@@ -143,20 +143,25 @@ class SeriesSession(Reporter):
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
         """The results of the cases with these numbers, a block at a time."""
+        for attempts in self.attempted(numbers):
+            yield self.results(attempts, self.assessed(attempts))
+
+    def attempted(self, numbers: Sequence[int]) -> Iterator[list[Attempt]]:
+        """The answers to the cases with these numbers, a block at a time."""
         for start in range(0, len(numbers), self.block):
             block = numbers[start : start + self.block]
             loads = list(zip(block, self.problem.loads([self.job.cases.load(k) for k in block]), strict=True))
             if self.session.batch is not None:
-                yield self._results(self._try_batch(loads))
+                yield self._try_batch(loads)
                 continue
             started, attempts = time.monotonic(), []
             for case, load in loads:
                 attempts.append(self._try(case, load))
                 if time.monotonic() - started > self.block_time_s:
-                    yield self._results(attempts)
+                    yield attempts
                     started, attempts = time.monotonic(), []
             if attempts:
-                yield self._results(attempts)
+                yield attempts
 
     def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[Attempt]:
         """Solve them all at once; if that raises, one after another, to find out which one does."""
@@ -189,15 +194,14 @@ class SeriesSession(Reporter):
             answer = failed(f"{type(error).__name__}: {error}"[:500])
         return Attempt(case, load, self.row, answer)
 
-    def _results(self, attempts: list[Attempt]) -> list[Result]:
-        """The rows and gaps, with a proven error bound for each answer."""
-        start = time.perf_counter()
-        assessed = self._assessed(attempts)
-        share = (time.perf_counter() - start) / len(attempts)
-        return [self._result(attempt, assessed.get(attempt.case), share) for attempt in attempts]
+    def results(self, attempts: list[Attempt], assessed: dict[int, Assessment]) -> list[Result]:
+        """The rows and gaps of attempts, with what `assessed` says of them."""
+        return [self._result(attempt, assessed.get(attempt.case)) for attempt in attempts]
 
-    def _assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
+    def assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
+        """The proven answers of those that are whole, by the number of the case."""
         self.report(phase="judging")
+        start = time.perf_counter()
         needs = self.problem.needs
         answered = [one for one in attempts if all(getattr(one.answer, name) is not None for name in needs)]
         if not answered:
@@ -206,16 +210,18 @@ class SeriesSession(Reporter):
         xs = [attempt.answer.x if "x" in needs else None for attempt in answered]
         loads = [attempt.load for attempt in answered]
         assessments = assess(self.proof, loads, lams, xs, ENOUGH * self.job.limit_mm)
+        for attempt in attempts:
+            attempt.row["form_s"] = (time.perf_counter() - start) / len(attempts)
         return {attempt.case: made for attempt, made in zip(answered, assessments, strict=True)}
 
-    def _result(self, attempt: Attempt, assessment: Assessment | None, assess_s: float) -> Result:
+    def _result(self, attempt: Attempt, assessment: Assessment | None) -> Result:
         answer, job = attempt.answer, self.job
         row = attempt.row | {
             "status": answer.status,
             "message": answer.cause,
             "iterations": answer.iterations,
             "inner_iterations": answer.inner_iterations,
-            "form_s": assess_s,
+            "form_s": attempt.row.get("form_s", 0.0),
             "verdict": "no_answer",
             "limit_mm": job.limit_mm,
             **self.code,

@@ -1,0 +1,118 @@
+"""Series of scenes with stages: each case against the scene that has its gap."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commands import harness
+from small_joints import GAP, two_parts
+
+from harness.results import series_file
+from harness.scene.solution import solve
+from harness.series.load_case_source import GapCases
+from harness.series.staged import last_scene
+from problems.effects.measured_gap import MeasuredGap
+from problems.forms import Form
+from problems.model.scene import JointScene
+from problems.scene_files import read_scene
+
+COUNT = 3
+POINTS = "points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]"
+STAGED = f"""
+title = "Tacked, shimmed, riveted, released"
+{two_parts()}
+{GAP}
+[[effect]]
+kind = "fasteners"
+name = "tacks"
+preload = 400.0
+{POINTS}
+[[effect]]
+kind = "shims"
+name = "shim"
+thickness = 0.02
+x = [0, 40]
+y = [0, 50]
+[[effect]]
+kind = "installed_fasteners"
+name = "rivets"
+preload = 30.0
+{POINTS}
+[[stage]]
+name = "tack"
+on = ["tacks"]
+[[stage]]
+name = "shim and rivet"
+on = ["shim", "rivets[0:2]"]
+[[stage]]
+name = "rivet"
+on = ["rivets[2:3]"]
+[[stage]]
+name = "release"
+off = ["tacks"]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    (tmp_path / "scene.toml").write_text(STAGED, "utf-8")
+    return tmp_path / "scene.toml"
+
+
+def with_gap(scene: JointScene, gap: Any) -> JointScene:
+    """The scene with these gaps at its contacts, (m,) mm, in place of the random ones."""
+    places = np.concatenate([scene.joint.places(pair) for pair in scene.joint.pairs])
+    measured = MeasuredGap(kind="measured_gap", points=tuple(map(tuple, np.column_stack([places, gap]))))
+    rest = (effect for effect in scene.effects if effect.kind != "initial_gap")
+    return replace(scene, effects=(*rest, measured))
+
+
+@pytest.mark.parametrize(("form", "solver"), [("dual", "newton"), ("sparse", "newton"), ("primal", "piqp")])
+def test_each_case_goes_through_all_stages(scene: Path, tmp_path: Path, form: Form, solver: str) -> None:
+    command = "series", scene, "--cases", COUNT, "--form", form, "--solver", solver, "--out", tmp_path / "s"
+    assert harness(*command, "--limit", 1e-6, "--tolerance", 1e-10).exit_code == 0
+    read = read_scene(str(scene))
+    assert isinstance(read, JointScene)
+    shims = solve(replace(read, stages=())).problem.load.g - solve(without_shims(read)).problem.load.g
+    cases = GapCases(count=COUNT).of(last_scene(read), form)
+    rows = sorted(series_file.rows(tmp_path / "s"), key=lambda row: row["case"])
+    assert len(rows) == COUNT
+    for row in rows:
+        exact = solve(with_gap(read, cases.load(row["case"]).g - shims))
+        assert row["max_gap_mm"] == pytest.approx(exact.gap.max(), abs=1e-8)
+        assert row["mean_gap_mm"] == pytest.approx(exact.gap.mean(), abs=1e-8)
+        largest = {stage.name: pytest.approx(stage.gap.max(), abs=1e-8) for stage in exact.stages}
+        assert row["stages_max_gap_mm"] == largest
+    assert len({row["max_gap_mm"] for row in rows}) == COUNT
+
+
+def without_shims(scene: JointScene) -> JointScene:
+    rest = tuple(effect for effect in scene.effects if effect.kind != "shims")
+    return replace(scene, effects=rest, stages=())
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "said"),
+    [
+        (("", ""), ("--sweep", "initial_gap.mean=0.1,0.2"), "has stages"),
+        (
+            ('kind = "initial_gap"', 'kind = "initial_gap"\nname = "gap"'),
+            (),
+            "a series replaces it",
+        ),
+    ],
+)
+def test_what_does_not_go_through_stages(
+    scene: Path, tmp_path: Path, change: tuple[str, str], options: tuple[str, ...], said: str
+) -> None:
+    text = STAGED.replace(*change) if change[0] else STAGED
+    if options == ():
+        text = text.replace('on = ["shim", "rivets[0:2]"]', 'on = ["gap", "shim", "rivets[0:2]"]')
+    scene.write_text(text, "utf-8")
+    done = harness(
+        "series", scene, "--cases" if not options else "--check", 2, *options, "--out", tmp_path / "s"
+    )
+    assert done.exit_code == 2
+    assert said in done.output.replace("\n", " ")
