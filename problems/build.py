@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.dependence import refuse_dependent
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.forms.prepared import Prepared
 from problems.model.effect import Effect
@@ -91,7 +92,7 @@ def prepared(scene: Scene, reporter: Reporter = SILENT, form: Form = "dual") -> 
     """K and A of a scene, condensed from the cache or now, or as they are for the sparse form.
 
     Factors and Q are made when first needed. Raises InputError if a part can move freely, if a user's
-    matrices are invalid, or if contacts of a rung depend on one another.
+    matrices are invalid, or in a dense form if contacts depend on one another.
     """
     model = model_of(scene)
     return model.sparse() if form == "sparse" else model.dense(reporter)
@@ -114,11 +115,11 @@ class GivenModel:
     def sparse(self) -> SparsePrepared:
         """K with sparse blocks. Raises InputError also if K is dense."""
         start, scene = time.perf_counter(), self.scene
-        assembly, *_ = self._checked(sparse=True)
+        assembly = self._read(sparse=True)[0]
         K = assembly.K.as_sparse(assembly.nodes)
         for block in K.blocks:
             share = block.matrix.nnz / block.size**2
-            if block.size > SMALL and share > DENSEST:
+            if block.size > SMALL and share > DENSEST and not assembly.dependent:
                 allowed = f"at most {DENSEST:.0%} of a block's entries; K is dense: use --form dual or primal"
                 raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
         seconds = time.perf_counter() - start
@@ -127,8 +128,9 @@ class GivenModel:
         return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, user_K)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
-        """K with dense blocks."""
-        assembly, _, seconds, key = self._checked(sparse=False)
+        """K with dense blocks. Raises InputError if contacts depend on one another."""
+        assembly, _, seconds, key = self._read(sparse=False)
+        refuse_dependent(assembly.A, self.scene.source_of("A"))
         K = assembly.K.as_dense()
         if K is not assembly.K:
             assembly = replace(assembly, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))
@@ -154,14 +156,10 @@ class GivenModel:
             given = user_matrices.holds_sparse(dict(scene.files))
         return self._read(sparse=True)[0] if given else None
 
-    def _checked(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
-        """As `_read`. Raises InputError if contacts of a rung are dependent; a user's A was checked."""
-        data = self._read(sparse)
-        if isinstance(self.scene, ManufacturedScene):
-            from problems.input.user_matrices import refuse_dependent
-
-            refuse_dependent(data[0].A, self.scene.source_of("A"))
-        return data
+    @property
+    def dependent(self) -> bool:
+        """Whether contacts depend on one another."""
+        return (self.stored_sparse or self._read(sparse=False)[0]).dependent
 
     def _read(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
         """The assembly and its load case, the seconds that reading them took, and their key."""

@@ -5,7 +5,8 @@ factors, Σ 2 b² entries for blocks of b unknowns, and Q, m² entries. The spar
 Σ N (w + 1) entries for blocks of N unknowns and half-bandwidth w.
 
 The form is the sparse one, unless the solver takes dense forms only, Q is in the cache, or the dense matrices
-are small for the number of load cases that share them.
+are small for the number of load cases that share them. Where contacts depend on one another, Q is singular,
+and only the sparse form takes them.
 """
 
 from collections.abc import Sequence
@@ -69,6 +70,11 @@ def size_of(scene: Scene, stored: bool = True) -> Size | None:
         return None
     usable = stored and isinstance(scene, JointScene) and size.dense_peak_mib <= physical_memory_mib()
     return replace(size, stored=usable and all(model.built for model in models))
+
+
+def has_dependent_contacts(scene: Scene) -> bool:
+    """Whether contacts depend on one another, in some stage."""
+    return any(model.dependent for model in models_of(scene))
 
 
 def _of_given(assembly: Assembly) -> Size:
@@ -138,7 +144,10 @@ def chosen_form(scene: Scene, taken: Sequence[Form], form: Form | None, cases: i
     if form is not None and form not in taken:
         raise InputError.one("--form", "form", form, f"the solver takes {' and '.join(taken)}")
     size = size_of(scene, stored=form is None)
-    choice = _by_rule(size, taken, cases) if form is None else Choice(form)
+    if form is None and "sparse" in taken and has_dependent_contacts(scene):
+        choice = Choice("sparse", "contacts depend on one another")
+    else:
+        choice = _by_rule(size, taken, cases) if form is None else Choice(form)
     refuse_what_cannot_fit(scene, size, choice.form)
     return choice
 

@@ -102,7 +102,7 @@ def export(
     read = read_scene(str(scene))
     refuse_unwritable(out, read.sources)
     if format is not None:
-        problem = opened(read)
+        problem = opened(read, chosen_form(read, FORMS, None).form)
         data = matrices(problem.prepared, problem.load)
         with atomic_output(out, read.sources) as new:
             formats.FORMATS[format].write(new, data)

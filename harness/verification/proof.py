@@ -43,6 +43,7 @@ from problems.storage import fingerprint
 from .balanced_units import Balanced
 from .closed_contacts import ClosedContacts, ScaledInverse
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
+from .feasible_push import Push, nearly_closed
 from .sprung_contacts import Springs, SprungContacts
 
 MAX_PASSES = 30
@@ -95,6 +96,11 @@ class Proof:
         """K with springs, where K is sparse and there is no M."""
         sprung = self.inverse.M is None and not self.balanced.assembly.K.dense
         return Springs(self.balanced, self.kappa) if sprung else None
+
+    @property
+    def pushes(self) -> bool:
+        """Whether contacts depend on one another, so that a push bounds what is missed."""
+        return self.balanced.sigma2 == 0 and self.springs is not None
 
     @cached_property
     def compliance(self) -> float:
@@ -189,12 +195,23 @@ class Proof:
         if sharpness is not Sharpness.PLAIN:
             reach = np.minimum(reach, np.sqrt(self.compliance))
         missed, force = length(abs(delta) + uncertain), length(abs(r.value) + r.error)
-        stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0
-        error = SAFE * (force / np.sqrt(self.kappa) + distance + missed * stretch)
+        if missed.any() and self.pushes:
+            columns = zip(s.value.T, s.error.T, uncertain.T, lam.hi.T, strict=True)
+            moved, unsure = np.array([self._pushed(*column) for column in columns]).T
+        else:
+            stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0
+            moved, unsure = missed * stretch, length(uncertain) * stretch
+        error = SAFE * (force / np.sqrt(self.kappa) + distance + moved)
         bounds = SAFE * (reach * error + D * lo).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
         valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
-        rounding = length(r.error) / np.sqrt(self.kappa) + length(uncertain) * stretch
+        rounding = length(r.error) / np.sqrt(self.kappa) + unsure
         return np.where(valid, bounds, np.inf), (reach * rounding + D * lo).max(axis=0, initial=0.0)
+
+    def _pushed(self, s: Vector, error: Vector, uncertain: Vector, lam: Vector) -> tuple[float, float]:
+        """‖x − x*‖_K or less, and its part that is due to the errors of s; all (m,)."""
+        assert self.springs is not None
+        push = Push.of(self.balanced, self.springs, self.kappa, nearly_closed(s, error, lam))
+        return push.distance(s, error, lam), push.distance(np.where(uncertain > 0, 0, s), uncertain, lam)
 
     def _translated(self, s: Enclosure, pressing: Mask) -> tuple[Enclosure, Vector]:
         """s + Aᵀz (m, k), and ‖z‖_K or more (k,). pressing (m, k) : where λ > 0."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.planning.form_choice import size_of
+from harness.planning.form_choice import has_dependent_contacts, size_of
 from harness.results import records
 from harness.results.answer_files import read_answer
 from problems import storage
@@ -131,7 +131,8 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
     """
     if not (isinstance(scene, JointScene) and scene.stages):
         return scene
-    form: Form = "sparse" if size_of(scene, stored=False) else "dual"
+    sparse = size_of(scene, stored=False) or has_dependent_contacts(scene)
+    form: Form = "sparse" if sparse else "dual"
     like: ReferenceProblem | None = None
 
     def solve(part: JointScene, approaches: Matrix) -> tuple[Vector, None]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -10,6 +11,8 @@ import scipy.sparse as sp
 from problems.stiffness import Indices, Matrix, Vector
 from problems.stiffness import Mask as Mask
 from problems.stiffness.operator import Stiffness
+
+from .dependence import is_dependent
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,11 @@ class Assembly:
     def m(self) -> int:
         """The number of contacts."""
         return int(self.A.shape[1])
+
+    @cached_property
+    def dependent(self) -> bool:
+        """Whether contacts depend on one another: Q is singular then, and λ one of many."""
+        return is_dependent(self.A)
 
     @property
     def junction_size(self) -> int:

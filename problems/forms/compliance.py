@@ -87,9 +87,9 @@ def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
     """M from local blocks of the Q of `like`, which has the same contacts: in single precision, or in double
     where some block is not positive definite in that.
 
-    There is no M where K has no band, where e ← e − MQe converges slowly, and for contacts all over an
-    area, where M takes longer than some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises
-    LinAlgError if Q is indefinite.
+    There is no M where contacts depend on one another, where K has no band, where e ← e − MQe converges
+    slowly, and for contacts all over an area, where M takes longer than some factorisations of K; the
+    diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is indefinite.
     """
     lengths = abs(assembly.A).max(axis=0).toarray()
     R = 1 / power_of_two(np.where(lengths, lengths, 1.0))  # in other units of the contacts, the same M
@@ -98,7 +98,7 @@ def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
 
 
 def _of_unit_contacts(assembly: Assembly, like: Assembly) -> ApproximateInverse:
-    windows, inverse = _along_bands(assembly), None
+    windows, inverse = None if assembly.dependent else _along_bands(assembly), None
     if windows is not None and windows.work <= SETS * assembly.K.factorisation_flops:
         if _single_might_do(assembly):
             with suppress(np.linalg.LinAlgError):

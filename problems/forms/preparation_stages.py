@@ -19,6 +19,7 @@ from problems.storage import fingerprint
 from .assembly import Assembly, Matrix
 from .prepared import Prepared
 
+ONE_OF_MANY = "Contacts depend on one another: x is unique, the forces λ are one choice of many"
 LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 
 SourceOf = Callable[[str], object]
@@ -43,7 +44,8 @@ class SparsePrepared(Prepared):
         coarser: Callable[[], Assembly] | None = None,
     ) -> None:
         K = Stiffness(assembly.K.blocks, self._factor)
-        super().__init__(replace(assembly, K=K), coarser=coarser)
+        notes = (*assembly.notes, ONE_OF_MANY) if assembly.dependent else assembly.notes
+        super().__init__(replace(assembly, K=K, notes=notes), coarser=coarser)
         self.key, self.model_s, self.source_of, self.user_K = key, model_s, source_of, user_K
 
     def _factor(self, K: Stiffness) -> None:

@@ -1,23 +1,18 @@
 """A user's own K, A, f, g: from an .npz, Matrix Market files, or arrays; checked once, then cached."""
 
 import time
-from bisect import bisect_left
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spsolve
 
 from problems import storage
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.dense_block import dense_blocks
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.sparse_block import sparse_block
 from problems.storage import fingerprint
 
 from . import matrix_files
@@ -30,10 +25,7 @@ Faults = Iterable[tuple[str, str, object, str]]
 NAMES = ("K", "A", "f", "g", "nodes")
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
 SMALL = 2000  # unknowns up to which a K is solved in the dense forms
-LOST = 2.0**-44  # of ‖a_j‖₂², per contact and entry: 256 ulps, for ‖z‖²
-SHOWN = 5  # columns named in a message
 UNCHANGED = "the file that it was when the scene was read"
-SLIGHT = 1e-6  # of the largest: a coefficient that is rounding
 
 
 def stored_matrices(files: Files, files_key: str, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
@@ -141,7 +133,6 @@ def checked(
         K = sp.csr_array(K / 2 + K.T / 2)
         notes.append(f"K, asymmetric by {skew:.1e} N/mm, was replaced by (K + Kᵀ)/2")
     A = sp.csc_array(A)
-    refuse_dependent(A, where.get("A", "matrices"))
     made = Stiffness.of(*([sp.csc_array(K)] if sparse else dense_blocks(K)), nodes=nodes)
     names = tuple(f"part {k + 1}" for k in range(len(made.blocks)))
     return Assembly(made, A, nodes, names, tuple(notes)), LoadCase(f, g)
@@ -202,44 +193,3 @@ def _fits(numbers: Any) -> bool:
         return bool((nearest == values).all())  # compared in the wider of the two
     inside = nearest < float(np.iinfo(values.dtype).max)  # 2⁶³ or 2⁶⁴, which would not convert back
     return bool(inside.all() and (nearest.astype(values.dtype) == values).all())
-
-
-def refuse_dependent(A: sp.csc_array, where: object, name: Callable[[int], str] = "A[:, {}]".format) -> None:
-    """Raise InputError naming the first column of A (n, m), none zero, that depends on earlier columns.
-
-    The pivots of AᵀA = LLᵀ tell: l_jj² = min_z ‖a_j − Σ_{i<j} z_i a_i‖₂². AᵀA is block diagonal, a block per
-    group of contacts that share unknowns, and is factored as a band or a sparse matrix. The rounding of l_jj²
-    is some k + (entries of a_j) ulps of ‖a_j‖₂² in a group of k contacts, times ‖z‖².
-    """
-    if not _dependent(A):
-        return
-    first = bisect_left(range(A.shape[1]), True, key=lambda j: _dependent(A[:, : j + 1]))
-    scaled = _scaled(A)
-    before = scaled[:, :first]
-    z = abs(spsolve(sp.csc_array(before.T @ before), (before.T @ scaled[:, [first]]).toarray().ravel()))
-    others = np.flatnonzero(z > z.max() * SLIGHT).tolist()
-    names = ", ".join(map(name, others[:SHOWN]))
-    more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
-    allowed = "must not depend on the columns before it"
-    raise InputError.one(where, name(first), f"dependent on {names}{more}", allowed)
-
-
-def _scaled(A: sp.csc_array) -> sp.csc_array:
-    """A with columns of similar sizes, without rounding, so that no square overflows."""
-    exponents = np.frexp(abs(A).max(axis=0).toarray().ravel())[1]
-    return sp.csc_array(A @ sp.diags_array(np.exp2(-exponents.astype(float))))
-
-
-def _dependent(A: sp.csc_array) -> bool:
-    if A.shape[1] == 0:
-        return False
-    scaled = _scaled(A)
-    G = sp.csc_array(scaled.T @ scaled)
-    terms = np.bincount(connected_components(G, directed=False)[1]).max() + np.diff(A.indptr).max()
-    block = sparse_block(G)
-    block.lost = float(terms * LOST)
-    try:
-        block.factor()
-    except NotPositiveDefinite:
-        return True
-    return False

@@ -45,6 +45,7 @@ class JointModel:
     parts: tuple[PartModel, ...]
     interiors: dict[int, tuple[Indices, SparseBlock]] = field(default_factory=dict, repr=False)
     stored_sparse: ClassVar[None] = None  # no K is given
+    dependent: ClassVar[bool] = False  # parts touch those beside them
 
     @classmethod
     def of(cls, scene: JointScene) -> "JointModel":

@@ -21,8 +21,9 @@ from problems import storage
 from problems.errors import Fault, InputError
 from problems.formats import DENSEST
 from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.dependence import is_dependent, refuse_dependent
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
-from problems.input.user_matrices import SMALL, refuse_dependent
+from problems.input.user_matrices import SMALL
 from problems.reporter import SILENT, Reporter
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
@@ -46,16 +47,20 @@ class SuperelementModel:
 
     @classmethod
     def of(cls, scene: JointScene) -> "SuperelementModel":
-        """The model of a scene. Raises InputError if parts are free, or if contacts depend on one another."""
+        """The model of a scene. Raises InputError if parts are free."""
         assert isinstance(scene.joint, SuperelementJoint)
         model = cls(scene, scene.joint)
         model._refuse_free()
-        refuse_dependent(model.A, scene.source_of("A"), model.joint.contact_name)
         return model
 
     @cached_property
     def A(self) -> sp.csc_array:
         return self.joint.contact_matrix()
+
+    @cached_property
+    def dependent(self) -> bool:
+        """Whether contacts depend on one another, as where three parts meet at one place."""
+        return is_dependent(self.A)
 
     @cached_property
     def springs(self) -> Springs:
@@ -71,7 +76,7 @@ class SuperelementModel:
         """K and A as sparse matrices. Raises InputError if a large K is dense."""
         start = time.perf_counter()
         for part in self.joint.parts:
-            if part.size > SMALL and not part.sparse:
+            if part.size > SMALL and not part.sparse and not self.dependent:
                 allowed = f"at most {DENSEST:.0%} of its entries nonzero: use --form dual or primal"
                 raise InputError.one(part.file, "K", "dense", allowed)
         matrices = [sp.csc_array(part.stiffness) for part in self.joint.parts]
@@ -85,6 +90,8 @@ class SuperelementModel:
         return SparsePrepared(self._assembly(blocks), key, seconds, self.scene.source_of, user_K=True)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
+        """K with dense blocks. Raises InputError if contacts depend on one another."""
+        refuse_dependent(self.A, self.scene.source_of("A"), self.joint.contact_name)
         start = time.perf_counter()
         matrices = [part.stiffness for part in self.joint.parts]
         blocks = [K.toarray(order="F") if sp.issparse(K) else K for K in matrices]
