@@ -172,8 +172,10 @@ class Windows:
     @property
     def work(self) -> float:
         """Operations of `of_windows`: per line with w contacts in its window w³/3 + 2w² across."""
-        sizes = ((stop - first, stop - start) for first, start, stop in self.ranges())
-        return float(sum(window**3 / 3 + 2 * window**2 * line for window, line in sizes))
+        starts = np.arange(0, len(self.order), self.across)
+        line = np.minimum(self.across, len(self.order) - starts)
+        window = line + np.minimum(starts, WINDOW_LINES * self.across)
+        return float((window**3.0 / 3 + 2.0 * window**2 * line).sum())
 
     def contacts(self) -> list[Indices]:
         """The contacts of each window."""
