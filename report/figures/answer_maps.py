@@ -73,10 +73,11 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
     history = style.figure(4.2)
     gap, force = history.subplots(2, 1, sharex=True)
     gap.plot(table["stage"], table["largest_mm"], color=style.BLACK, marker="o")
+    ends = [*table["largest_mm"], (record.get("allowed_gap") or {}).get("allowed_mm", 0.0)]
     if allowed := record.get("allowed_gap"):
         gap.axhline(allowed["allowed_mm"], color=LARGER, linestyle="--", label="limit")
         gap.legend()
-    gap.set(ylabel="largest gap, mm", ylim=(0, None))
+    gap.set(ylabel="largest gap, mm", ylim=(min(0.0, *ends), 1.1 * max(ends) or None))
     names = [name for name in table.columns if name.endswith(", N")]
     for name, (colour, marker) in zip(names, itertools.cycle(LINES), strict=False):
         look: dict[str, Any] = {"color": colour, "marker": marker, "markerfacecolor": "none"}
