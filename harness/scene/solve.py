@@ -88,17 +88,15 @@ def solve_into(
             allowed_gap.check_stages(solution.stages, allow_gap_mm, record["stages"])
         console.print(_history(record, arrays))
     if allow_gap_mm is not None:
+        record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
+    if allow_gap_mm is not None or stressed:
         from report.page.answer_page_data import headline  # slow to import: not before the answer is shown
 
-        record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
         verdict = headline(record, arrays)
-        code = code or show_verdict(verdict["kind"], [verdict["text"]], console)
-    if stressed:
-        told = [f"{record['stress']['said']}."]
-        if allow_stress is None:
-            console.print(*told)
+        if allow_gap_mm is None and allow_stress is None:
+            console.print(verdict["text"])
         else:
-            code = code or show_verdict(record["stress"]["kind"], told, console)
+            code = code or show_verdict(verdict["kind"], [verdict["text"]], console)
     with reporter.step("pictures and files"), atomic_output(out, scene.sources) as new:
         from report.writers.answer_report import write
 

@@ -84,7 +84,8 @@ def recorded(found: Stresses, mesh: MeshError | None, allowed: float | None) -> 
     """
     largest = found.largest
     if not largest:
-        return {"kind": "", "said": "Forces at points act near all elements: no stress is told"}
+        untold = {} if allowed is None else {"allowed": allowed, "exceeded": None}
+        return untold | {"kind": "", "said": "Forces at points act near all elements: no stress is told"}
     at = f"{largest['part']}, on both faces, x = {largest['x']:.4g} mm, y = {largest['y']:.4g} mm"
     said = (
         f"largest von Mises stress {largest['von_mises']:.3g} N/mm², {at}; proven to {largest['error']:.1e}"

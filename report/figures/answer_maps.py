@@ -9,12 +9,12 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from report.results.answer_record import Answer, pair_name, stages
+from report.results.answer_record import Answer, pair_name, stages, von_mises
 
 from . import style
 from .deformed_faces import deformed_figure
 from .gap_section import section_figure
-from .junction_maps import CLOSED, LARGER, RIM, Array, Map, Outlines, Scale, drawn, grid_of, rooted
+from .junction_maps import CLOSED, LARGER, RIM, Array, Map, Marks, Outlines, Scale, drawn, grid_of, rooted
 
 #: Colour and marker of the force in each kind of fastener over the stages.
 LINES = [
@@ -36,6 +36,7 @@ def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str
                 figures[name] = figure
         if (arrays["lam"] > 0).any():
             figures["forces"] = _forces(record, arrays)
+        figures |= {"stress": _stress(record, arrays)} if "stress" in arrays else {}
         return figures | {"displacement": _displacement(record, arrays)}
 
 
@@ -109,8 +110,8 @@ def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     maps = []
     for part in parts:
         here = slice(part["start"], part["stop"])
-        marks = record["marks"] | ({"supports": part["supports"]} if part["supports"] else {})
-        maps.append(Map(f"displacement of {part['name']}", arrays["nodes"][here], x[here], scale, (), marks))
+        title = f"displacement of {part['name']}"
+        maps.append(Map(title, arrays["nodes"][here], x[here], scale, (), _marks(record, part)))
     corners = np.array([(x, y) for part in parts for x in part["outline"][:2] for y in part["outline"][2:]])
     figure, panels = drawn(maps, len(parts), corners)
     for axes, part in zip(panels, parts, strict=True):
@@ -123,6 +124,24 @@ def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
             if side in part["clamped"]:
                 axes.plot([west, east], [y, y], color="#222222", lw=3.0, clip_on=False)
     return figure
+
+
+def _stress(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
+    """Von Mises' stress of each part; outlined: where it is not to be read."""
+    values, near = von_mises(arrays), arrays["stress_near_force"]
+    scale = rooted("von Mises stress, N/mm²", "cividis", np.where(near, 0.0, values))
+    maps = []
+    for k, part in enumerate(record["parts"]):
+        here = arrays["stress_part"] == k
+        outlines = [(near[here], LARGER, "not to be read")]
+        title = f"von Mises stress of {part['name']}"
+        places, marks = arrays["stress_places"][here], _marks(record, part)
+        maps.append(Map(title, places, values[here], scale, outlines, marks))
+    return drawn(maps, len(maps))[0]
+
+
+def _marks(record: dict[str, Any], part: dict[str, Any]) -> Marks:
+    return record["marks"] | ({"supports": part["supports"]} if part["supports"] else {})
 
 
 def gap_maps(answers: list[Answer], names: list[str]) -> dict[str, Figure]:

@@ -62,9 +62,19 @@ def facts(record: Data) -> list[list[str]]:
 
 
 def headline(record: Data, arrays: dict[str, Array]) -> Data:
-    """The first sentence of an answer: whether a gap is larger than the limit, if there is one, and how large
-    the largest gap is and where. kind : "pass", "fail", or "" if neither can be said.
+    """The first sentences of an answer: whether a gap, or a stress, is larger than its limit, if there is
+    one, and how large the largest is and where. kind : "pass", "fail", or "" if neither can be said.
     """
+    gap, stress = _gap_headline(record, arrays), record.get("stress")
+    if stress is None:
+        return gap
+    limited = [gap["kind"]] * ("allowed_gap" in record) + [stress["kind"]] * ("allowed" in stress)
+    kind = "fail" if "fail" in limited else "pass" if limited and "" not in limited else ""
+    return {"kind": kind, "text": f"{gap['text']} {stress['said']}."}
+
+
+def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
+    """The sentence on the largest gap."""
     if not record["m"]:
         return {"kind": "pass" if "allowed_gap" in record else "", "text": "The scene has no contact."}
     gap = arrays["gap_after"]

@@ -12,7 +12,7 @@ import numpy as np
 from report.document.numbers import counted, without_rounding
 from report.figures.junction_maps import cell_edges, grid_of
 from report.page.page_file import Data, choice, entry, exact, packed
-from report.results.answer_record import pair_name
+from report.results.answer_record import pair_name, von_mises
 from report.results.reader import Results
 from report.results.series_results import Array, Series
 
@@ -26,6 +26,7 @@ SHARES = (1.0, 0.99, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.
 COLOUR_ENTRIES = {"low": "from", "high": "to", "threshold": "outline above"}
 SHOWN_FIRST = ("gap after", "95 % quantile")
 FIELDS = {"gap_before": "gap before", "gap_after": "gap after", "lam": "force"}
+STRESS = "von Mises stress"
 
 
 def scene_maps(results: Results) -> Data:
@@ -47,10 +48,16 @@ def scene_maps(results: Results) -> Data:
 
 
 def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
-    """The maps of one answer, one per pair of parts in contact."""
+    """The maps of one answer, one per pair of parts in contact, and one of the stress in each plate."""
     fields = {text: arrays[name] for name, text in FIELDS.items()}
     gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
-    return _pairs(record, fields | {f"gap of {stage['name']}": gap for stage, gap in gaps}, arrays)
+    page = _pairs(record, fields | {f"gap of {stage['name']}": gap for stage, gap in gaps}, arrays)
+    for k, part in enumerate(record["parts"] if "stress" in arrays else ()):
+        here = arrays["stress_part"] == k
+        values = np.where(arrays["stress_near_force"], np.nan, von_mises(arrays))[here]
+        name = f"stress of {part['name']}"
+        _added(page, name, arrays["stress_places"][here], {STRESS: values}, _marked(record), noun="place")
+    return page
 
 
 def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
@@ -67,12 +74,16 @@ def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
 
 def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array]) -> Data:
     page = _empty()
-    marks = np.array([point for points in record.get("marks", {}).values() for point in points])
+    marks = _marked(record)
     for pair in record["pairs"] if "contact_nodes" in arrays else ():
         contacts = slice(pair["start"], pair["stop"])
         of_pair = {name: values[contacts] for name, values in fields.items()}
         _added(page, pair_name(pair), arrays["contact_nodes"][contacts], of_pair, marks)
     return page
+
+
+def _marked(record: Data) -> Array:
+    return np.array([point for points in record.get("marks", {}).values() for point in points])
 
 
 def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
@@ -146,7 +157,13 @@ def _empty() -> Data:
 
 
 def _added(
-    page: Data, name: str, nodes: Array, fields: dict[str, Array], marks: Array, budget: float = np.inf
+    page: Data,
+    name: str,
+    nodes: Array,
+    fields: dict[str, Array],
+    marks: Array,
+    budget: float = np.inf,
+    noun: str = "contact",
 ) -> bool:
     """Whether the map fitted into the page."""
     step = _step(len(nodes))
@@ -160,7 +177,7 @@ def _added(
         return False
     if place not in groups:
         groups.append(place)
-    about = counted(len(nodes), "contact") + (f", every {step}th of which is drawn" if step > 1 else "") + "."
+    about = counted(len(nodes), noun) + (f", every {step}th of which is drawn" if step > 1 else "") + "."
     x, y = np.reshape(marks, (-1, 2)).T.tolist()
     page["maps"].append(
         {
@@ -196,7 +213,7 @@ def _field(name: str, values: Array) -> Data:
     force = name == FIELDS["lam"]
     return {
         "kind": "force" if force else "gap",
-        "unit": "N" if force else "mm",
+        "unit": "N" if force else "N/mm²" if name == STRESS else "mm",
         "low": 1e-4 * high if force else without_rounding(float(np.nanmin(values, initial=0.0)), high),
         "high": high,
         "hover": True,

@@ -41,6 +41,27 @@ def contacts(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
     )
 
 
+def stresses(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
+    """One line per place of each plate and side, N/mm²; the bottom has the stresses of the top, negative."""
+    names = np.array([part["name"] for part in record["parts"]])
+    x, y = arrays["stress_places"].T
+    places = {"part": names[arrays["stress_part"]], "x": x, "y": y}
+    value = {"von_mises": von_mises(arrays), "proven_error": arrays["stress_error"]}
+    value["not_to_be_read"] = np.where(arrays["stress_near_force"], "force at a point", "")
+    sides = []
+    for side, sign in (("top", 1.0), ("bottom", -1.0)):
+        signed = (sign * arrays["stress"]).T
+        components = dict(zip(("sxx", "syy", "sxy"), signed, strict=True))
+        sides.append(pd.DataFrame(places | {"side": side} | components | value))
+    return pd.concat(sides, ignore_index=True)
+
+
+def von_mises(arrays: dict[str, Array]) -> Array:
+    """(k,) von Mises' stress at the places of `stress`, N/mm²."""
+    xx, yy, xy = arrays["stress"].T
+    return np.asarray(np.sqrt(xx**2 - xx * yy + yy**2 + 3 * xy**2))
+
+
 def fasteners(record: dict[str, Any]) -> pd.DataFrame:
     """One line per fastener and contact."""
     lines = [

@@ -2,6 +2,8 @@
 with maps, and one page of PDF.
 """
 
+import itertools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +16,22 @@ from report.figures.answer_maps import answer_figures
 from report.figures.junction_maps import grid_of
 from report.page.answer_page_data import answer_data, facts, headline
 from report.page.page_file import write as write_page
-from report.results.answer_record import contacts, fasteners, nodes, pair_name, read, stages
+from report.results.answer_record import (
+    contacts,
+    fasteners,
+    nodes,
+    pair_name,
+    read,
+    stages,
+    stresses,
+    von_mises,
+)
 from report.results.series_results import Array
 from report.writers.answer_pdf import write_pdf
 from report.writers.sections_writer import written
+
+#: Points, cells and point data for meshio.
+Grid = tuple[Array, list[tuple[str, Any]], dict[str, Array]]
 
 CAPTIONS = {
     "history": "*The largest gap, and the sums of the forces,* at the end of each stage.",
@@ -26,6 +40,8 @@ CAPTIONS = {
     "deformed": "*The parts around the largest gap*, not to scale: the first grey, the second coloured by "
     "the gap left.",
     "gap": "*The gap before and after*, on square-root scales; outlined: closed contacts.",
+    "stress": "*The bending stress of the plates*, by von Mises, on a square-root scale; outlined: near a "
+    "force at a point, where the moment of a plate has no limit.",
     "forces": "*The contact forces*, on a square-root scale; outlined: closed contacts.",
     "displacement": "*The displacements*, positive from the first part of a contact to the second; hatched: "
     "the rest of a part; thick: a clamped edge.",
@@ -43,11 +59,15 @@ def write(directory: Path) -> Path:
     check = record.get("allowed_gap") or {}
     if check.get("contacts"):
         files["exceeding"] = files["contacts"].iloc[check["contacts"]]
+    if "stress" in arrays:
+        files["stress"] = stresses(record, arrays)
     blocks: list[Block] = []
     figures, vtu = {}, "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         figures = answer_figures(record, arrays)
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
+        if "stress" in arrays and vtu == "solution.vtu":
+            vtu = f"{vtu}, {write_vtu(directory / 'stress.vtu', record, arrays, grid_with_stresses)}"
     drawn = {name: Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()}
     blocks += [*_stages(record, arrays)]
     blocks += [
@@ -137,9 +157,11 @@ def _skipped(record: dict[str, Any]) -> list[Block]:
     return [Text(text) for text in (*digits, "\n".join(lines)) if text]
 
 
-def write_vtu(path: Path, record: dict[str, Any], arrays: dict[str, Any]) -> str:
+def write_vtu(
+    path: Path, record: dict[str, Any], arrays: dict[str, Any], grid: Callable[..., Grid] | None = None
+) -> str:
     """Write the parts' junction nodes with their fields. Returns the file's name, or why it was not written,
-    since meshio is optional.
+    since meshio is optional. grid : makes points, cells and point data; by default of those nodes.
 
     Point data: displacement (0, 0, x) in mm, to warp by; part; Aλ, the force with which the node pushes on
     what it touches, N; the smallest gap before and after at its contacts, mm, NaN if it has none.
@@ -148,13 +170,22 @@ def write_vtu(path: Path, record: dict[str, Any], arrays: dict[str, Any]) -> str
         import meshio
     except ModuleNotFoundError:
         return "not written: meshio is not installed (pip install 'rivetbench[vtu]')"
-    meshio.Mesh(*grid_with_fields(record, arrays)).write(path)
+    meshio.Mesh(*(grid or grid_with_fields)(record, arrays)).write(path)
     return path.name
 
 
-def grid_with_fields(
-    record: dict[str, Any], arrays: dict[str, Any]
-) -> tuple[Array, list[tuple[str, Any]], dict[str, Array]]:
+def grid_with_stresses(record: dict[str, Any], arrays: dict[str, Any]) -> Grid:
+    """Points, cells and point data of the stresses on the top face, N/mm²; not_to_be_read is 0 or 1."""
+    part, places = arrays["stress_part"], arrays["stress_places"]
+    components = dict(zip(("sxx", "syy", "sxy"), arrays["stress"].T, strict=True))
+    data = {"part": part.astype(float), **components, "von_mises": von_mises(arrays)}
+    data["not_to_be_read"] = arrays["stress_near_force"].astype(float)
+    starts = np.searchsorted(part, np.arange(len(record["parts"]) + 1))
+    blocks = [_cells(places[a:b], int(a)) for a, b in itertools.pairwise(starts)]
+    return np.column_stack([places, np.zeros(len(places))]), blocks, data
+
+
+def grid_with_fields(record: dict[str, Any], arrays: dict[str, Any]) -> Grid:
     """Points (n, 3), cells and point data for meshio."""
     nodes, n = arrays["nodes"], len(arrays["nodes"])
     force, initial, remaining = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)

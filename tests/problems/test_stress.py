@@ -3,7 +3,9 @@
 import json
 from pathlib import Path
 
+import meshio
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.sparse as sp
 from commands import harness
@@ -182,6 +184,30 @@ def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str)
         record = json.loads((tmp_path / "a/solution.json").read_text("utf-8"))
         assert record["stress"]["largest"]["von_mises"] == pytest.approx(2.13, abs=0.005)
         assert record["stress"]["mesh_error"] > 0
+        assert f"{word}: limit {allowed} N/mm²" in (tmp_path / "a/answer.md").read_text("utf-8")
+
+
+def test_every_stress_is_written(tmp_path: Path) -> None:
+    scene, out = "gallery/installed-fasteners", tmp_path / "a"
+    limits = ("--allow-stress", 1e3, "--allow-gap", 1e-4)
+    done = harness("solve", scene, *limits, "--out", out)
+    assert done.exit_code == 4, done.output  # the gap is too large, the stress is not
+    found, table = stresses(solve(scene)), pd.read_csv(out / "stress.csv", keep_default_na=False)
+    assert list(table)[:8] == ["part", "x", "y", "side", "sxx", "syy", "sxy", "von_mises"]
+    for part in found.parts:
+        of_part = table[table["part"] == part.part]
+        for side, sign in (("top", 1), ("bottom", -1)):
+            of_side = of_part[of_part["side"] == side]
+            read = of_side[["sxx", "syy", "sxy"]].to_numpy()
+            np.testing.assert_allclose(read, sign * part.components, rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(of_side["von_mises"], part.von_mises, rtol=1e-12)
+            np.testing.assert_array_equal(of_side["not_to_be_read"] != "", part.near_force)
+    mesh = meshio.read(out / "stress.vtu")
+    assert mesh.cells[0].type == "quad"
+    np.testing.assert_allclose(mesh.point_data["sxx"], table[table["side"] == "top"]["sxx"])
+    assert "![The bending stress of the plates](stress.png)" in (out / "answer.md").read_text("utf-8")
+    assert f"stress of {found.parts[0].part}" in (out / "index.html").read_text("utf-8")
+    assert (out / "stress.png").stat().st_size > 0
 
 
 def test_a_scene_asks_for_stresses(tmp_path: Path) -> None:
