@@ -134,7 +134,6 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "force / np.sqrt(self.kappa)",
         ),
         "+ distance + moved)": ("+ distance)", "+ distance + moved / 2)", ")"),
-        "return push.distance(s, error, lam), ": ("return push.distance(s, 0 * error, lam), ",),
         "np.sqrt(np.divide(units.stiffest, units.sigma2)) if": (
             "np.sqrt(units.stiffest) if",
             "np.sqrt(np.divide(1.0, units.sigma2)) if",

@@ -111,6 +111,9 @@ def test_the_distance_holds_on_a_spring(lam: float, overlap: float, slope: float
         found = push.distance(-(overlap - error) * one, error * one, lam * one)
         most = k * (abs(overlap) + 3 * error) ** 2 + 16 * lam * (abs(overlap) + 3 * error)
         assert away <= found <= 1.1 * most**0.5 + 1e-160
+        theta, open_mm = max(overlap, 0.0) / (slope - error), abs(overlap - error) + error
+        gap = lam * (open_mm + theta * (slope + error))  # of each of the two
+        assert found >= (k * (theta * slope) ** 2 + 4 * gap) ** 0.5
 
 
 def test_a_push_that_closes_another_contact_proves_nothing() -> None:
