@@ -5,8 +5,8 @@ Any x and λ ≥ 0, with C = {λ > 0}, are the exact answer of another problem, 
     r = f − Kx − Aλ,    s = g − Aᵀx,    δ_i = −s_i for i in C,    δ_i = max(−s_i, 0) else.
 
 The answer is P(K⁻¹f), P the projection onto {Aᵀx ≤ g} in the norm of K. From f to f̃ it moves by at most
-‖r‖_{K⁻¹}. From g to g̃ the set is translated by d = A(AᵀA)⁻¹δ, and P then moves by at most ‖d‖_K, because
-I − P is nonexpansive. So, in balanced units (balanced_units.py), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
+‖r‖_{K⁻¹}. From g to g̃ the set is translated by d = A(AᵀA)⁻¹δ, and P then moves by d/2 and at most ‖d‖_K/2,
+because I − P is firmly nonexpansive. So, in balanced units (balanced_units.py), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
 
     |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).                                     (plain)
 
@@ -14,7 +14,7 @@ The factor D_i/√κ may be replaced by √(K⁻¹)_ii (compliant). Any other d 
 λ are exact for the gap g + Aᵀd: d = z + A(AᵀA)⁻¹δ', δ' the δ of s + Aᵀz, is short for z = K⁻¹AMδ, M ≈ Q⁻¹,
 or z = K⁻¹A_C Q_CC⁻¹δ_C. This costs one solution with K and saves the refinement of many load cases:
 
-    |x_i − x*_i| ≤ √(K⁻¹)_ii ( ‖r‖₂/√κ + ‖z‖_K + ‖δ'‖₂ √(‖K‖_∞/σ²) ).                         (translated)
+    |x_i − x*_i| ≤ |z_i|/2 + √(K⁻¹)_ii ( ‖r‖₂/√κ + ‖z‖_K/2 + ‖δ'‖₂ √(‖K‖_∞/σ²) ).              (translated)
 
 Nothing is assumed about the contact set: weakly active contacts need no special treatment, and it does not
 matter where λ came from. Refinement of x and λ_C in twice the working precision makes the bound small:
@@ -185,12 +185,13 @@ class Proof:
     ) -> tuple[Vector, Vector]:
         """The bound of each column (k,) mm, and its part that is due to the roundings of x, r and s."""
         units, at_junction = self.balanced, self.balanced.assembly.at_junction
-        pressing, distance = lam.hi > 0, np.zeros(x.hi.shape[1])
+        pressing, z, distance = lam.hi > 0, np.zeros_like(x.lo), 0.0
         if sharpness is Sharpness.TRANSLATED:
-            s, distance = self._translated(s, pressing)
+            s, z = self._translated(s, pressing)
+            distance = units.energy(z) / 2
         delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
         uncertain = s.error * (pressing | (s.value < s.error))
-        D, lo = at_junction(units.D), abs(at_junction(x.lo))
+        D, away = at_junction(units.D), at_junction(abs(x.lo) + abs(z) / 2)
         reach = D / np.sqrt(self.kappa)
         if sharpness is not Sharpness.PLAIN:
             reach = np.minimum(reach, np.sqrt(self.compliance))
@@ -202,10 +203,10 @@ class Proof:
             stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0
             moved, unsure = missed * stretch, length(uncertain) * stretch
         error = SAFE * (force / np.sqrt(self.kappa) + distance + moved)
-        bounds = SAFE * (reach * error + D * lo).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
+        bounds = SAFE * (reach * error + D * away).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
         valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
         rounding = length(r.error) / np.sqrt(self.kappa) + unsure
-        return np.where(valid, bounds, np.inf), (reach * rounding + D * lo).max(axis=0, initial=0.0)
+        return np.where(valid, bounds, np.inf), (reach * rounding + D * away).max(axis=0, initial=0.0)
 
     def _pushed(self, s: Vector, error: Vector, uncertain: Vector, lam: Vector) -> tuple[float, float]:
         """‖x − x*‖_K or less, and its part that is due to the errors of s; all (m,)."""
@@ -213,15 +214,15 @@ class Proof:
         push = Push.of(self.balanced, self.springs, self.kappa, nearly_closed(s, error, lam))
         return push.distance(s, error, lam), push.distance(np.where(uncertain > 0, 0, s), uncertain, lam)
 
-    def _translated(self, s: Enclosure, pressing: Mask) -> tuple[Enclosure, Vector]:
-        """s + Aᵀz (m, k), and ‖z‖_K or more (k,). pressing (m, k) : where λ > 0."""
+    def _translated(self, s: Enclosure, pressing: Mask) -> tuple[Enclosure, Matrix]:
+        """s + Aᵀz (m, k), and z (n, k). pressing (m, k) : where λ > 0."""
         units, delta = self.balanced, np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
         columns = zip(delta.T, pressing.T, strict=True)
         z = units.solve(units.A @ np.column_stack([self.inverse.forces(*column) for column in columns]))
         roundings = int(np.diff(units.At.indptr).max(initial=0)) + 1
         sizes = abs(s.value) + abs(units.At) @ abs(z)
         rounding = gamma(roundings) * sizes + roundings * ETA * z.any(axis=0)
-        return Enclosure(s.value + units.At @ z, s.error + SAFE * rounding), units.energy(z)
+        return Enclosure(s.value + units.At @ z, s.error + SAFE * rounding), z
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float = 0.0) -> tuple[Matrix, Matrix]:

@@ -97,7 +97,9 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "np.sqrt(self.compliance)",
             "np.minimum(reach, self.compliance)",
         ),
-        "s.error + SAFE * rounding), units": ("s.error), units", "SAFE * rounding), units"),
+        "s.error + SAFE * rounding), z": ("s.error), z", "SAFE * rounding), z"),
+        "distance = units.energy(z) / 2": ("distance = units.energy(z) / 4", "pass"),
+        " + abs(z) / 2)": (")", " + abs(z) / 4)"),
         "abs(s.value) + abs(units.At) @ abs(z)": ("abs(s.value)",),
         " + roundings * ETA * z.any(axis=0)": ("",),
         "        delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))": (
@@ -115,10 +117,10 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "abs(r.value + r.error).max(axis=0)",
         ),
         "reach = D / np.sqrt(self.kappa)\n": ("reach = D\n",),
-        "(reach * error + D * lo)": (
+        "(reach * error + D * away)": (
             "(reach * error)",
-            "(reach * error + D * lo / 2)",
-            "(reach * error + lo)",
+            "(reach * error + D * away / 2)",
+            "(reach * error + away)",
         ),
         " + ETA * x.hi.any(axis=0)": ("",),
         " & ~(lam.hi < 0).any(axis=0)": ("",),
