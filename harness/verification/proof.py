@@ -116,10 +116,11 @@ class Proof:
 
     @cached_property
     def spread(self) -> float:
-        """max|x − x*| / ‖δ‖₂ at most, mm."""
+        """max|x − x*| / ‖δ‖₂ at most, mm; compliant, for where a bound suffices."""
         units = self.balanced
-        stretch = np.sqrt(np.divide(units.stiffest, units.sigma2 * self.kappa))
-        return float(units.assembly.at_junction(units.D).max(initial=0.0) * stretch) or 1.0
+        reach = float(units.assembly.at_junction(units.D).max(initial=0.0)) / np.sqrt(self.kappa)
+        stretch = np.sqrt(np.divide(units.stiffest, units.sigma2))
+        return float(min(reach, np.sqrt(self.compliance)) * stretch) or 1.0
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def proven(
@@ -171,7 +172,7 @@ class Proof:
                 bounds, rounding = self.bounds(x2, lam2, r, s, sharpness)
             if step or not (bounds <= enough_mm).all():
                 r, s = units.residuals(load, x2, lam2)
-                bounds, rounding = self.bounds(x2, lam2, r, s)
+                bounds, rounding = self.bounds(x2, lam2, r, s, sharpness)
         D, R = units.D[:, 0], units.R[:, 0]
         return [Proven(answer.x.scaled(D), answer.lam.scaled(R), answer.bound_mm) for answer in best]
 

@@ -92,7 +92,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "return sigma2 if sigma2 >= SMALLEST else 0.0": ("return sigma2",),
     },
     "harness/verification/proof.py": {
-        "self.bounds(x2, lam2, r, s, sharpness)": ("self.bounds(x2, lam2, r, s)",),
+        "r, s, sharpness)\n            if": ("r, s)\n            if",),
         "np.minimum(reach, np.sqrt(self.compliance))": (
             "np.sqrt(self.compliance)",
             "np.minimum(reach, self.compliance)",
