@@ -6,7 +6,7 @@ Any x and λ ≥ 0, with C = {λ > 0}, are the exact answer of another problem, 
 
 The answer is P(K⁻¹f), P the projection onto {Aᵀx ≤ g} in the norm of K. From f to f̃ it moves by at most
 ‖r‖_{K⁻¹}. From g to g̃ the set is translated by d = A(AᵀA)⁻¹δ, and P then moves by d/2 and at most ‖d‖_K/2,
-because I − P is firmly nonexpansive. So, in balanced units (balanced_units.py), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
+as I − P is firmly nonexpansive. So, in balanced units (balanced_units.py), κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
 
     |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).                                     (plain)
 
@@ -186,7 +186,7 @@ class Proof:
     ) -> tuple[Vector, Vector]:
         """The bound of each column (k,) mm, and its part that is due to the roundings of x, r and s."""
         units, at_junction = self.balanced, self.balanced.assembly.at_junction
-        pressing, z, distance = lam.hi > 0, np.zeros_like(x.lo), 0.0
+        pressing, z, distance = lam.hi > 0, np.zeros_like(x.lo), np.zeros(x.hi.shape[1])
         if sharpness is Sharpness.TRANSLATED:
             s, z = self._translated(s, pressing)
             distance = units.energy(z) / 2
