@@ -186,16 +186,26 @@ class Proof:
     ) -> tuple[Vector, Vector]:
         """The bound of each column (k,) mm, and its part that is due to the roundings of x, r and s."""
         units, at_junction = self.balanced, self.balanced.assembly.at_junction
-        pressing, z, distance = lam.hi > 0, np.zeros_like(x.lo), np.zeros(x.hi.shape[1])
+        z, distance = np.zeros_like(x.lo), np.zeros(x.hi.shape[1])
         if sharpness is Sharpness.TRANSLATED:
-            s, z = self._translated(s, pressing)
+            s, z = self._translated(s, lam.hi > 0)
             distance = units.energy(z) / 2
-        delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
-        uncertain = s.error * (pressing | (s.value < s.error))
         D, away = at_junction(units.D), at_junction(abs(x.lo) + abs(z) / 2)
         reach = D / np.sqrt(self.kappa)
         if sharpness is not Sharpness.PLAIN:
             reach = np.minimum(reach, np.sqrt(self.compliance))
+        error, rounding = self._energies(lam, r, s, distance)
+        bounds = SAFE * (reach * error + D * away).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
+        valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
+        return np.where(valid, bounds, np.inf), (reach * rounding + D * away).max(axis=0, initial=0.0)
+
+    def _energies(
+        self, lam: DoubleDouble, r: Enclosure, s: Enclosure, distance: Vector
+    ) -> tuple[Vector, Vector]:
+        """‖x − x*‖_K (k,) or more, √(N·mm), of r, s and a distance (k,); its part from roundings."""
+        units, pressing = self.balanced, lam.hi > 0
+        delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
+        uncertain = s.error * (pressing | (s.value < s.error))
         missed, force = length(abs(delta) + uncertain), length(abs(r.value) + r.error)
         if missed.any() and self.pushes:
             columns = zip(s.value.T, s.error.T, uncertain.T, lam.hi.T, strict=True)
@@ -204,10 +214,18 @@ class Proof:
             stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0
             moved, unsure = missed * stretch, length(uncertain) * stretch
         error = SAFE * (force / np.sqrt(self.kappa) + distance + moved)
-        bounds = SAFE * (reach * error + D * away).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
-        valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
         rounding = length(r.error) / np.sqrt(self.kappa) + unsure
-        return np.where(valid, bounds, np.inf), (reach * rounding + D * away).max(axis=0, initial=0.0)
+        return error, rounding
+
+    @np.errstate(over="ignore", invalid="ignore", divide="ignore")
+    def energy_error(self, load: LoadCase, x: Vector, lam: Vector) -> float:
+        """‖x − x*‖_K or more, √(N·mm), of x (n,) mm with its rounding; λ (m,) N is about the exact one."""
+        units = self.balanced
+        x, lam = x[:, None] / units.D, np.maximum(lam, 0.0)[:, None] / units.R
+        x2, lam2 = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
+        r, s = units.residuals(units.load([load]), x2, lam2)
+        error = float(self._energies(lam2, r, s, np.zeros(1))[0][0])
+        return error if np.isfinite(error) else np.inf
 
     def _pushed(self, s: Vector, error: Vector, uncertain: Vector, lam: Vector) -> tuple[float, float]:
         """‖x − x*‖_K or less, and its part that is due to the errors of s; all (m,)."""

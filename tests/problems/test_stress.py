@@ -13,6 +13,7 @@ from scipy.sparse.linalg import spsolve
 
 from harness.scene.solution import solve
 from harness.scene.stress import stresses, stresses_of
+from harness.verification.reference import proof_of
 from problems.effects.local_thickness import LocalThickness
 from problems.effects.thermal_bending import ThermalBending
 from problems.errors import InputError
@@ -161,6 +162,25 @@ def test_the_error_of_a_rough_answer_is_said() -> None:
         assert (abs(one.components - other.components).max(axis=1) <= error).all()
         assert (abs(one.von_mises - other.von_mises) <= error).all()
         assert error.max() > 1e-9
+
+
+@pytest.mark.parametrize("name", ["three-part-stack", "installed-fasteners", "padded-panel"])
+def test_the_energy_of_an_error_counts_the_rounding_of_the_answer(name: str) -> None:
+    """Twice as precise displacements, and perturbed ones, are within the bound; it is no wild guess."""
+    answer = solve(f"gallery/{name}", form="sparse")
+    problem, random = answer.problem, np.random.default_rng(3)
+    K, lam = problem.prepared.assembly.K, problem.reference.lam
+    proof = proof_of(problem.prepared)
+    for size in (1e-12, 1e-3):
+        e = size * random.standard_normal(len(answer.unknowns)) / np.sqrt(K.diagonal)
+        energy = float(np.sqrt(e @ K.multiply(e)))
+        bound = proof.energy_error(problem.load, answer.unknowns + e, lam)
+        assert energy <= bound + proof.energy_error(problem.load, answer.unknowns, lam)
+        assert size < 1e-6 or bound < 1e6 * energy
+    rounded = answer.unknowns + np.ldexp(answer.unknowns, -52)  # a unit in the last place away
+    before, after = (stresses_of(problem.scene, x) for x in (answer.unknowns, rounded))
+    for one, other, error in zip(before, after, stresses(answer).errors, strict=True):
+        assert (abs(one.components - other.components).max(axis=1) <= error).all()
 
 
 def test_forces_at_points_are_named() -> None:
