@@ -7,7 +7,8 @@ From a point (λ, y) with y exact, a set C has λ⁺ = λ + dλ with
 The first set is found from few contacts to many: that of every 64th contact along the joint without the
 others, then of every 16th and every 4th, each from the last. A contact that carries a force there carries
 one among more contacts as a rule, or a neighbour does. So no set is much larger than the last, while those
-from all contacts that overlap without forces begin with most of them.
+from all contacts that overlap without forces begin with most of them. Where sets creep for long, an interior
+point finds one (interior_set.py).
 """
 
 import numpy as np
@@ -15,14 +16,18 @@ import numpy as np
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.forms.banded_inverse import Windows
 from problems.forms.closed_factor import ClosedFactor
+from problems.forms.compliance import DenseCompliance
 from problems.stiffness.dense_block import product
 from solvers.base import DualLoadCase
 
 from .block_pivoting import TrialSolution, block_pivoting
+from .interior_set import interior_set
+from .newton_system import Direct
 
 STRIDES = 64, 16, 4
 FEWEST = 12  # contacts of a first set that is worth while
 MOST_SETS = 30  # among some of the contacts
+YIELDING = 2.0**-30  # of diag(Q), at glued contacts: Q may be nearly singular
 UNCERTAINTY = 1e-9  # of |y_C| where a change starts: rounding
 
 
@@ -57,6 +62,12 @@ class ClosedSets:
             C = np.zeros(len(p), dtype=bool)
             C[some] = closed
         return C
+
+    def interior_set(self, load: DualLoadCase) -> tuple[Mask, Vector, int]:
+        """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took."""
+        system, diagonal = Direct(self.Q), np.diag(self.Q)
+        glued = system.solve(YIELDING * diagonal, load.p, 0.0, 0).v
+        return interior_set(DenseCompliance(self.Q), system, diagonal, load.p, glued)
 
 
 def _solved(Q: Matrix, p: Vector, C: Mask) -> Mask:

@@ -35,7 +35,7 @@ from problems.forms.sprung_stiffness import SprungStiffness
 from solvers.base import DualLoadCase
 
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
-from .interior_set import interior_set
+from .interior_set import Sprung, interior_set
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact, or more where K is well conditioned
 KEPT = 2.0**40  # ρ in these units times cond(K): the springs keep the last twelve bits of K
@@ -151,4 +151,6 @@ class ContactSprings:
         """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took."""
         if not (load.p > 0).any():
             return load.p > 0, np.zeros_like(load.p), 0
-        return interior_set(self.compliance, self.sprung, self.diagonal, load.p, self.rho)
+        system = Sprung(self.compliance, self.sprung, self.rho)
+        system.take(np.zeros_like(load.p))
+        return interior_set(self.compliance, system, self.diagonal, load.p, system.near(load.p))

@@ -1,8 +1,9 @@
-"""A first contact set by interior-point steps, for sparse K without a banded M ≈ Q⁻¹.
+"""A first contact set by interior-point steps, where there is no banded M ≈ Q⁻¹.
 
 Contact sets see an edge of contact, which creeps by about a row of contacts per set; interior points see all
-contacts at once. Mehrotra's steps (interior_point.py) have systems (Q + D) v = b, D = YΛ⁻¹, which K with
-springs D⁻¹ at all contacts solves (Sherman, Morrison and Woodbury), in one numbering for all D:
+contacts at once. Mehrotra's steps (interior_point.py) have systems (Q + D) v = b, D = YΛ⁻¹. A dense Q + D is
+factored. For a sparse K they are solved by K with springs D⁻¹ at all contacts (Sherman, Morrison, Woodbury),
+in one numbering for all D:
 
     v = D⁻¹ (b − Aᵀ (K + A D⁻¹ Aᵀ)⁻¹ A D⁻¹ b).
 
@@ -17,7 +18,7 @@ glued by springs ρ, (Q + I/ρ) λ = p, and v the largest overlap max p,
 import numpy as np
 
 from problems.forms.assembly import Mask, Vector
-from problems.forms.compliance import ComplianceProducts
+from problems.forms.compliance import Compliance, ComplianceProducts
 from problems.forms.sprung_stiffness import SprungStiffness
 
 from .interior_point import NewtonSteps, mehrotra
@@ -58,18 +59,17 @@ class Sprung(NewtonSystem):
 
 
 def interior_set(
-    Q: ComplianceProducts, sprung: SprungStiffness, compliance: Vector, p: Vector, rho: float
+    Q: Compliance, system: NewtonSystem, compliance: Vector, p: Vector, glued: Vector
 ) -> tuple[Mask, Vector, int]:
     """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took.
 
     It ends with μ = λᵀy/m at 1e-17 of its first value. Closed is a contact whose λ falls less in the last
     step than its y, λ⁺/λ > y⁺/y (Tapia's indicators, which have no unit). p (m,) mm : the overlap without
-    contact. compliance : about diag(Q).
+    contact. compliance : about diag(Q). glued : about Q⁻¹p.
     """
-    system, overlap = Sprung(Q, sprung, rho), float(p.max(initial=0.0))
+    overlap = float(p.max(initial=0.0))
     newton = NewtonSteps(Q, p, system, THETA, REFINEMENT, np.inf)
-    system.take(np.zeros(len(p)))
-    point = newton.at(np.maximum(abs(system.near(p)), overlap / compliance), np.maximum(-p, 0.0) + overlap)
+    point = newton.at(np.maximum(abs(glued), overlap / compliance), np.maximum(-p, 0.0) + overlap)
     last, enough = point, SMALLEST * point.mu
     for _ in range(MAX_STEPS):
         if point.mu <= enough:

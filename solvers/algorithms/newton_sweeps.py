@@ -41,6 +41,7 @@ from .contact_sets import ContactSprings, OpenFactor, banded_set, yielding_set
 
 MAX_SWEEPS = 200
 FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and their growth per sweep
+LATE = 6  # the sweep before which sets of a dense Q, bordered from one to the next, may creep
 PATIENCE = 3  # contact sets of the first sweep before creeping edges change the method
 TARGET = 0.02  # of the tolerance: the |y_C| of a settled case; x can be off by some hundred times that
 STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve a residual below the second number: rounding
@@ -230,11 +231,11 @@ class Sweeps:
         order = self.order
         floor = self._floor(case, case.trial)
         most, dense = int(FIRST_SETS * GROWTH**case.sweeps), self.prepared.assembly.K.dense
-        begins = case.sweeps == 0 and not (dense and self.M is None)
+        begins = case.sweeps == (LATE if dense and self.M is None else 0)
         result = block_pivoting(at, case.C, self.compliance, floor, most, PATIENCE if begins else None)
         if begins and result.creeps:
             if self.M is None:
-                C, lam, factorisations = self.springs.interior_set(case.load)
+                C, lam, factorisations = self.sets.interior_set(case.load)
                 C, lam = C[order], np.where(C, lam, 0.0)
                 y = self.gaps(lam[:, None], [case.load])[order, 0]
                 case.trial = TrialSolution(lam[order], y, float(abs(y[C]).max(initial=0.0)))
