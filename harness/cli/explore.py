@@ -18,8 +18,9 @@ def explore(
     """Open a page on which fasteners are dragged, and the gap follows.
 
     Fasteners move, come and go; preload, pressures, the mean gap and the limit are sliders. The page says
-    PASS or FAIL with the largest gap, its place and its proven error. A plan can be kept beside the next
-    one, and saved as a scene that `solve` answers alike. It is served to this machine only; Ctrl-C ends it.
+    PASS or FAIL with the largest gap, its place and its proven error, after the last stage of the scene or
+    another one. A plan can be kept beside the next one, and saved as a scene that `solve` answers alike. It
+    is served to this machine only; Ctrl-C ends it.
 
     \b
     Examples:

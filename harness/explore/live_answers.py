@@ -1,11 +1,14 @@
 """Answers a scene while its loads and gaps change: matrices are made once, each answer starts from the last.
 
 The settings change effects of the scene: places and preload of its fasteners, the pressures, the mean of the
-initial gap. The forces and gaps of an effect are kept as long as it stays the same.
+initial gap; none of them changes K. The forces and gaps of an effect are kept as long as it stays the same.
+An answer goes through all stages of the scene; those with the same K share its matrices.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -18,16 +21,18 @@ from harness.scene.solution import Source, load_scene
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
-from problems.build import load_case, prepared
+from problems.build import load_case, prepared, shares_stiffness
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
 from problems.forms import FORMS, Form
-from problems.forms.assembly import DualLoadCase, LoadCase, Vector
+from problems.forms.assembly import DualLoadCase, LoadCase, Matrix, Vector
 from problems.input.bounded_types import validation_faults
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
+from problems.model.stage_answers import locked, through
+from problems.model.stages import Plan
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import DualStart
 
@@ -62,6 +67,10 @@ class Settings:
         """The settings of a scene. Raises InputError if it has no fasteners that can move."""
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
+        if scene.stages and (len(fasteners) > 1 or any(fasteners[0]._stages)):
+            where, given = f"scene {scene.name}", [effect.name for effect in fasteners]
+            allowed = "one table, set by its name and not by a column stage: they change places"
+            raise InputError.one(where, "fasteners in stages", given, allowed)
         marks = np.concatenate([effect.marks(scene.joint) for effect in fasteners])
         means = tuple(effect.mean for effect in scene.effects_of(InitialGap))
         pressures = tuple(effect.value for effect in scene.effects_of(Pressure))
@@ -89,8 +98,11 @@ class Settings:
                 continue
             made.append(new)
         for effect in made:
-            wrong = effect.faults(scene.joint, [other for other in made if other is not effect])
+            others = [other for other in made if other is not effect and not scene.stages]
+            wrong = effect.faults(scene.joint, others)
             faults += [Fault(PAGE, f"{effect.kind}.{key}", value, allowed) for key, value, allowed in wrong]
+        if not faults:
+            faults = [Fault(PAGE, *fault) for fault in Plan(made, scene.stages, scene.joint).faults()]
         if faults:
             raise InputError(faults)
         return tuple(made)
@@ -120,7 +132,15 @@ class LiveAnswer:
     gap : array (m,), mm
         Remaining gaps.
     error_mm : float, optional
-        Proven bound on the error of every gap, mm; None while nothing is proven.
+        Proven bound on the error of every gap, mm; None while nothing is proven. In a stage it holds for the
+        approaches that the stages before have locked.
+    stage : str
+        The name of its stage; "" without stages.
+    stages : tuple of LiveAnswer
+        What each stage of the scene has reached; the other entries are those of the last one. Empty without
+        stages.
+    starts : tuple of DualStart
+        Each problem that was solved on the way: those of the next answer start from them.
     """
 
     settings: Settings
@@ -128,6 +148,9 @@ class LiveAnswer:
     lam: Vector
     gap: Vector
     error_mm: float | None = None
+    stage: str = ""
+    stages: tuple["LiveAnswer", ...] = ()
+    starts: tuple[DualStart, ...] = ()
 
 
 class Explorer:
@@ -160,10 +183,15 @@ class Explorer:
         self.settings = Settings.of(joint_scene)
         assert isinstance(joint_scene, JointScene)
         self.scene, self.form = joint_scene, form or chosen_form(joint_scene, FORMS, None).form
-        self.data = prepared(self.scene, form=self.form)
-        self.sweeps = Sweeps(self.data)
-        self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
-        self.contribution = lru_cache(maxsize=256)(self._contribution)
+        self.sessions: list[_Session] = []  # of each problem that `through` solves, in its order
+        for _ in through(self.scene, self._opened):
+            pass
+        self.data = self.sessions[-1].data
+
+    def _opened(self, part: JointScene, approaches: Matrix) -> tuple[Matrix, None]:
+        shared = (one for one in self.sessions if shares_stiffness(part, one.scene))
+        self.sessions.append(next(shared, None) or _Session(part, self.form))
+        return np.zeros((self.scene.joint.size[0], 1)), None
 
     def answer(self, settings: Settings, near: LiveAnswer | None = None) -> LiveAnswer:
         """Solve the scene with other settings, to about 1e-5 mm.
@@ -178,25 +206,14 @@ class Explorer:
         Returns
         -------
         LiveAnswer
-            Contact forces and gaps, not proven yet.
+            Contact forces and gaps, of the last stage and of each, not proven yet.
 
         Raises
         ------
         InputError
             If a setting is wrong.
         """
-        effects = settings.applied(self.scene)
-        parts = [self.contribution(effect) for effect in effects if not isinstance(effect, StiffnessEffect)]
-        none = self.contribution(None)
-        f, g = sum((f for f, _ in parts), none[0]), sum((g for _, g in parts), none[1])
-        (load,) = self.data.with_p([LoadCase(f, g)])
-        return self._solved(settings, load, TOLERANCE_MM, near)
-
-    def _solved(
-        self, settings: Settings, load: DualLoadCase, tolerance: float, near: LiveAnswer | None
-    ) -> LiveAnswer:
-        start = None if near is None else DualStart(near.load, near.lam, near.gap)
-        return LiveAnswer(settings, load, *self.sweeps.vectors(self.sweeps.solved(load, tolerance, start)))
+        return self._through(settings, near, proven=False)
 
     def proven(self, answer: LiveAnswer) -> LiveAnswer:
         """Refine an answer, and prove how far its gaps may be off.
@@ -209,14 +226,62 @@ class Explorer:
         Returns
         -------
         LiveAnswer
-            The gaps, mm, to more digits, with `error_mm`.
+            The gaps, mm, to more digits, with `error_mm`, in each stage.
         """
-        answer = self._solved(answer.settings, answer.load, PROVEN_MM, answer)
-        (assessed,) = assess(self.proof, [answer.load], [answer.lam], [None], LIMIT_MM / 2)
-        error = self.gap_error(answer.load.g, assessed.x, assessed.bound_mm)
-        return replace(answer, gap=assessed.gap, error_mm=float(error.max(initial=0.0)))
+        return self._through(answer.settings, answer, proven=True)
+
+    def _through(self, settings: Settings, near: LiveAnswer | None, proven: bool) -> LiveAnswer:
+        scene = replace(self.scene, effects=settings.applied(self.scene))
+        sessions, starts = iter(self.sessions), list[DualStart]()
+        earlier = iter(near.starts) if near else repeat(None)
+
+        def solved(part: JointScene, approaches: Matrix) -> tuple[Matrix, LiveAnswer]:
+            session, start = next(sessions), next(earlier)
+            load = session.load(locked(part, approaches[:, 0]).effects, start)
+            lam, gap = session.solved(load, PROVEN_MM if proven else TOLERANCE_MM, start)
+            x, error = np.zeros(len(load.f)), None
+            if proven:
+                x, gap, error = session.proven(load, lam)
+            elif scene.stages:  # else nothing is locked
+                x = session.data.assembly.K.solve(load.f - session.data.assembly.A @ lam)
+            starts.append(DualStart(load, lam, gap))
+            return session.data.assembly.at_junction(x), LiveAnswer(settings, load, lam, gap, error)
+
+        stages = [replace(answer, stage=name) for name, _, _, answer in through(scene, solved)]
+        return replace(stages[-1], stages=tuple(stages) if scene.stages else (), starts=tuple(starts))
+
+
+class _Session:
+    """What stages with the same K share. scene : one of them."""
+
+    def __init__(self, scene: JointScene, form: Form) -> None:
+        self.scene, self.form = scene, form
+        self.data = prepared(scene, form=form)
+        self.sweeps = Sweeps(self.data)
+        self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
+        self.contribution = lru_cache(maxsize=256)(self._contribution)
+
+    def load(self, effects: Iterable[Effect], near: DualStart | None) -> DualLoadCase:
+        """The sum of their forces and gaps. near : its load is the answer if they have not changed."""
+        parts = [self.contribution(effect) for effect in effects if not isinstance(effect, StiffnessEffect)]
+        none = self.contribution(None)
+        f, g = sum((f for f, _ in parts), none[0]), sum((g for _, g in parts), none[1])
+        if near and np.array_equal(f, near.load.f) and np.array_equal(g, near.load.g):
+            return near.load
+        (load,) = self.data.with_p([LoadCase(f, g)])
+        return load
 
     def _contribution(self, effect: Effect | None) -> tuple[Vector, Vector]:
         """f and g of one effect; of None, zeros."""
         load = load_case(self.scene, self.form, [] if effect is None else [effect])
         return load.f, load.g
+
+    def solved(self, load: DualLoadCase, tolerance: float, start: DualStart | None) -> tuple[Vector, Vector]:
+        """λ (m,) N and the gaps (m,) mm."""
+        return self.sweeps.vectors(self.sweeps.solved(load, tolerance, start))
+
+    def proven(self, load: DualLoadCase, lam: Vector) -> tuple[Vector, Vector, float]:
+        """x and the gaps (m,) that belong to λ, mm, and the largest error of a gap, mm."""
+        (assessed,) = assess(self.proof, [load], [lam], [None], LIMIT_MM / 2)
+        error = self.gap_error(load.g, assessed.x, assessed.bound_mm)
+        return assessed.x, assessed.gap, float(error.max(initial=0.0))

@@ -1,5 +1,7 @@
 """The page in a browser: a gap map with fasteners to drag, sliders, the outcome, a kept plan beside it.
 
+The map and the outcome are those of one stage of the scene, by default the last.
+
 Bokeh's server calls `changed` when a fastener is let go or a slider stops; the answer is drawn at once and
 proven right after. If the settings on the page are wrong, the last answer stays, in grey.
 """
@@ -16,7 +18,7 @@ import numpy as np
 from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
 from bokeh.layouts import column, row
-from bokeh.models import Button, ColorBar, ColumnDataSource, Div, Slider, TextInput
+from bokeh.models import Button, ColorBar, ColumnDataSource, Div, Select, Slider, TextInput
 from bokeh.models.mappers import LinearColorMapper
 from bokeh.models.tools import PointDrawTool
 from bokeh.plotting import figure
@@ -63,6 +65,9 @@ class Page:
         self.fasteners = ColumnDataSource(_columns(first.settings))
         self.kept_fasteners = ColumnDataSource(_columns(first.settings))
         self.outcome, self.kept_outcome, self.fault = Div(width=WIDE), Div(width=WIDE), Div(width=WIDE)
+        names = [one.stage for one in first.stages]
+        self.stage = Select(title="after stage", value=first.stage, options=names, visible=bool(names))
+        self.stage.on_change("value", lambda attr, old, new: self.show())
         self.sliders = self._sliders(first.settings, limit_mm)
         self.path = TextInput(title="scene file", value=str(Path(source).stem) + "-moved.toml")
         self.fasteners.on_change("data", self.changed)
@@ -89,7 +94,7 @@ class Page:
         hint = Div(text="Drag a fastener. Click on the map to add one; select and Backspace removes it.")
         now = self._map("now", self.cells, self.fasteners, draws=True)
         then = self._map("kept", self.kept_cells, self.kept_fasteners, draws=False)
-        dials = column(*self.sliders.values(), self.path, row(keep, save), hint)
+        dials = column(self.stage, *self.sliders.values(), self.path, row(keep, save), hint)
         maps = column(self.outcome, now, self.fault, self.kept_outcome, then)
         return row(maps, dials)
 
@@ -160,12 +165,18 @@ class Page:
         self.answer = self.explorer.proven(self.answer)
         self.say()
 
+    @property
+    def shown(self) -> LiveAnswer:
+        """The answer of the stage that the page shows."""
+        chosen = (one for one in self.answer.stages if one.stage == self.stage.value)
+        return next(chosen, self.answer)
+
     def show(self) -> None:
-        self.cells.data = {"gap": [self.raster.image(self.answer.gap)]}
+        self.cells.data = {"gap": [self.raster.image(self.shown.gap)]}
         self.say()
 
     def say(self) -> None:
-        self.outcome.text = outcome(self.answer, self.places, float(self.sliders["limit"].value))
+        self.outcome.text = outcome(self.shown, self.places, float(self.sliders["limit"].value))
 
     def keep(self) -> None:
         """Show this plan beside those to come."""
@@ -208,9 +219,10 @@ def outcome(answer: LiveAnswer, places: Matrix, limit_mm: float) -> str:
     word = "cannot be told" if untold else "PASS" if gap <= limit_mm else "FAIL"
     colour = {"PASS": "#009E73", "FAIL": OVER}.get(word, "#666666")
     above = np.count_nonzero(answer.gap > limit_mm)
+    after = f"after {escape(answer.stage)}: " if answer.stage else ""
     return (
-        f'<b style="color:{colour};font-size:130%">{word}</b> largest gap <b id="gap">{gap:.6g}</b> mm at '
-        f"{place}; {above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
+        f'<b style="color:{colour};font-size:130%">{word}</b> {after}largest gap <b id="gap">{gap:.6g}</b> '
+        f"mm at {place}; {above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
         f"{len(answer.settings.places)} fasteners, {np.count_nonzero(answer.lam)} contacts closed, which "
         f"carry {answer.lam.sum():.4g} N. {sure}"
     )

@@ -68,6 +68,82 @@ def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Pat
     assert answer.gap.max() > 0.05  # with no fastener left
 
 
+def staged(path: Path, preload: float = 0.0) -> str:
+    """The scene of `path` with stages: tacked, riveted twice, in a hole of a tack, too, let go."""
+    rivets = f"stiffness = 3e3\npreload = {preload}\npoints = [[35.0, 15.0], [20.0, 10.0], [150.0, 20.0]]\n"
+    text = path.read_text().replace('"fasteners"', '"fasteners"\nname = "tacks"')
+    text += f'[[effect]]\nkind = "installed_fasteners"\nname = "rivets"\n{rivets}'
+    for name, on, off in (
+        ("tack", ["tacks"], []),
+        ("rivet", ["rivets[0:1]"], []),
+        ("fill", ["rivets[1:3]"], ["rivets[0:1]"]),
+        ("release", [], ["tacks"]),
+    ):
+        text += f'[[stage]]\nname = "{name}"\non = {on}\noff = {off}\n'
+    return text
+
+
+@pytest.mark.parametrize(("form", "preload", "problems"), [("dual", 25.0, [3, 6]), ("sparse", 0.0, [2, 4])])
+def test_each_stage_is_that_of_solve(
+    path: Path, tmp_path: Path, form: Any, preload: float, problems: list[int]
+) -> None:
+    """After moves, each from the answer before. A stage is solved again if its rivets have a preload.
+
+    problems : the number of different K, and of the problems that are solved.
+    """
+    scene = tmp_path / "scene.toml"
+    scene.write_text(staged(path, preload))
+    explorer = Explorer(scene_of(scene), form)
+    assert [len(set(map(id, explorer.sessions))), len(explorer.sessions)] == problems
+    settings, answer = explorer.settings, None
+    moved = (*settings.places[:2], (123.4, 40.0))
+    for k, change in enumerate(
+        ({}, {"places": moved, "preload": 55.0}, {"means": (0.08,), "pressures": (-2e-4,)})
+    ):
+        settings = replace(settings, **change)  # type: ignore[arg-type]
+        quick = explorer.answer(settings, answer)
+        answer = explorer.proven(quick)
+        saved = tmp_path / f"{k}.toml"
+        saved.write_text(edited(str(scene), tmp_path, settings.write_to, CHANGED))
+        solution = solve(str(saved), form=form)
+        for rough, live, exact in zip(quick.stages, answer.stages, solution.stages, strict=True):
+            assert rough.stage == live.stage == exact.name
+            assert live.error_mm is not None
+            assert live.error_mm <= 1e-6
+            assert abs(live.gap - exact.gap).max() <= live.error_mm + 1e-7
+            assert abs(rough.gap - exact.gap).max() <= 1e-5
+            np.testing.assert_allclose(live.lam.sum(), exact.lam.sum(), atol=1e-3)
+        np.testing.assert_array_equal(answer.gap, answer.stages[-1].gap)
+        np.testing.assert_allclose(answer.load.f, solution.problem.load.f, rtol=1e-9, atol=1e-6)
+    assert abs(answer.stages[0].gap - answer.gap).max() > 0.01
+
+
+ANOTHER = """
+[[effect]]
+kind = "fasteners"
+preload = 40.0
+points = [[100.0, 10.0]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[[stage]]", ANOTHER + "[[stage]]", "one table, set by its name"),
+        ("points = [[20.0", 'file = "tacks.csv"  # [[20.0', "not by a column stage"),
+    ],
+)
+def test_stages_set_one_table_of_fasteners_that_move(
+    path: Path, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    (tmp_path / "tacks.csv").write_text("x,y,stage\n20,10,tack\n50,25,rivet\n")
+    scene = tmp_path / "scene.toml"
+    text = staged(path).replace(old, new, 1)
+    scene.write_text(text.replace("on = ['tacks']", "on = []") if "csv" in new else text)
+    with pytest.raises(InputError, match=said):
+        Explorer(scene_of(scene), "dual")
+
+
 def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
     third = two_parts().split("[[joint.part]]")[2].replace('"b"', '"c"')
     gap = '[[effect]]\nkind = "initial_gap"\nbetween = {}\nmean = {}\n'
@@ -143,6 +219,26 @@ def test_what_solve_would_refuse_is_refused_on_the_page(path: Path, tmp_path: Pa
     assert not (tmp_path / "moved.toml").exists()
     dragged(page, 149.0, 25.0)
     assert page.fault.text == ""
+
+
+def test_a_stage_is_chosen_on_the_page(path: Path, tmp_path: Path) -> None:
+    """The last one at first; a scene without stages has no choice. What a stage sets has to stay."""
+    assert not page_of(tmp_path / "plain.toml", path.read_text()).stage.visible
+    page = page_of(tmp_path / "scene.toml", staged(path))
+    exact = solve(str(tmp_path / "scene.toml")).stages
+    assert page.stage.options == ["tack", "rivet", "fill", "release"]
+    for k in (3, 0):
+        page.stage.value = exact[k].name
+        page.prove()
+        assert f"after {exact[k].name}: largest gap" in page.outcome.text
+        assert f'id="gap">{exact[k].gap.max():.6g}<' in page.outcome.text
+        shown = page.cells.data["gap"][0]
+        np.testing.assert_allclose(np.nanmax(shown), exact[k].gap.max(), atol=1e-5)
+    dragged(page, 120.0, 12.0)
+    assert page.shown.stage == "tack"
+    assert page.fault.text == ""
+    page.fasteners.data = {"x": [], "y": []}
+    assert "page: stage[0] (tack).on = &#x27;tacks&#x27;: " in page.fault.text
 
 
 def test_a_dropped_fastener_is_solved_and_saved_to_the_micrometre(path: Path, tmp_path: Path) -> None:
