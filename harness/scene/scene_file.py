@@ -14,7 +14,7 @@ from problems.random_scenes import drawn_table
 from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_toml
 
 MOVED = ("fasteners",)  # what `with_fasteners` changes
-FILES = ("assembly", "file", "superelement", "nodes")  # keys whose values may be paths, relative to the file
+FILES = ("assembly", "file", "superelement", "nodes", "stress", "stress_points")  # may be relative paths
 
 
 def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequence[str]) -> str:

@@ -1,10 +1,13 @@
-"""The bending stresses of a scene's plates, with the error that is proven for them.
+"""The stresses of a scene's plates, or those that superelements recover, with the error proven for them.
 
 No stress is off by more than its sensitivity (problems/model/stress.py) times ‖x − x*‖_K, which the proof
 bounds for the x that is stored, with its rounding. To an answer of a solver its distance from the reference
 is added. The sparse form has all unknowns in x. In the dense forms those inside a part are recovered, and
 ‖x − x*‖_K is that of all of them, too; the roundings of condensation and recovery are not counted. Nor is the
 error of the mesh (mesh_error.py).
+
+The sensitivity of a row s of a recovery matrix is ‖s‖_{K⁻¹} ≤ ‖z‖_K + ‖r‖₂/√κ in balanced units, r = s − K z
+with z ≈ K⁻¹s, κ ≤ λmin(K). r is rounded by γ_{n+2} (‖s‖₂ + ‖K‖_∞ ‖z‖₂).
 """
 
 from dataclasses import dataclass
@@ -12,7 +15,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
+from harness.verification.enclosure import SAFE, length
+from harness.verification.proof import Proof
 from harness.verification.reference import proof_of
 from problems.build import model_of
 from problems.errors import InputError
@@ -22,11 +28,14 @@ from problems.model.joint_model import JointModel
 from problems.model.positions import Positions
 from problems.model.scene import JointScene, Scene
 from problems.model.stress import PartStress, part_stress
+from problems.stiffness import gamma
 
 from .mesh_error import MeshError
 from .solution import Solution
 
-NONE = "left out: only plates have stresses; a stiffness of nodes alone tells none"
+NONE = "left out: only plates have stresses, and superelements with `stress` and `stress_points`"
+FACES = ("both faces", "the top", "the bottom")  # 0, 1, -1
+ROWS = 300  # of a recovery matrix, at a time
 
 
 @dataclass(frozen=True)
@@ -46,14 +55,14 @@ class Stresses:
 
     @cached_property
     def largest(self) -> dict[str, Any]:
-        """The largest von Mises stress where no force at a point is near: part, x, y, value, error."""
+        """The largest von Mises stress where no force at a point is near: part, x, y, face, value, error."""
         best: dict[str, Any] = {}
         for part, error in zip(self.parts, self.errors, strict=True):
             value = np.where(part.near_force, -1.0, part.von_mises)
-            k = int(value.argmax())
-            if value[k] > best.get("von_mises", -1.0):
+            if value.max(initial=-1.0) > best.get("von_mises", -1.0):
+                k = int(value.argmax())
                 x, y = part.places[k].tolist()
-                best = {"part": part.part, "x": x, "y": y}
+                best = {"part": part.part, "x": x, "y": y, "face": FACES[part.side[k]]}
                 best |= {"von_mises": float(value[k]), "error": float(error[k])}
         return best
 
@@ -65,6 +74,7 @@ class Stresses:
             "stress_part": np.arange(len(counts)).repeat(counts),
             "stress_places": np.concatenate([part.places for part in self.parts]),
             "stress": np.concatenate([part.components for part in self.parts]),
+            "stress_side": np.concatenate([part.side for part in self.parts]),
             "stress_error": np.concatenate(self.errors),
             "stress_near_force": np.concatenate([part.near_force for part in self.parts]),
         }
@@ -87,12 +97,14 @@ def recorded(found: Stresses, mesh: MeshError | None, allowed: float | None) -> 
     if not largest:
         untold = {} if allowed is None else {"allowed": allowed, "exceeded": None}
         return untold | {"kind": "", "said": "Forces at points act near all elements: no stress is told"}
-    at = f"{largest['part']}, on both faces, x = {largest['x']:.4g} mm, y = {largest['y']:.4g} mm"
+    at = f"{largest['part']}, on {largest['face']}, x = {largest['x']:.4g} mm, y = {largest['y']:.4g} mm"
     said = (
         f"largest von Mises stress {largest['von_mises']:.3g} N/mm², {at}; proven to {largest['error']:.1e}"
     )
     grid = None if mesh is None else mesh.stress
     said += ", mesh error not known" if grid is None else f", mesh error about {grid:.1g} N/mm²"
+    if none := [part.part for part in found.parts if not len(part.places)]:
+        said += f", none known of {', '.join(none)}"
     record: dict[str, Any] = {"largest": largest, "mesh_error": grid, "kind": ""}
     if allowed is None:
         return record | {"said": said[0].upper() + said[1:]}
@@ -106,10 +118,10 @@ def recorded(found: Stresses, mesh: MeshError | None, allowed: float | None) -> 
 
 
 def refuse_unusable(allowed: float | None, scene: Scene) -> None:
-    """Raise InputError unless it is a stress, or None, and the scene has plates."""
+    """Raise InputError unless it is a stress, or None, and parts have stresses."""
     if allowed is not None and not 0 < allowed < np.inf:
         raise InputError.one("--allow-stress", "stress, N/mm²", allowed, "must be positive and finite")
-    refuse_without_plates(scene)
+    _ = [part.recovery for part, _ in _superelements(scene)]
 
 
 def largest_of(scene: JointScene, x: Vector) -> float:
@@ -119,23 +131,23 @@ def largest_of(scene: JointScene, x: Vector) -> float:
 
 
 def stresses(solution: Solution) -> Stresses:
-    """The bending stresses of a solution's plates, after its last stage.
+    """The stresses of a solution's plates or superelements, after its last stage.
 
     Parameters
     ----------
     solution : Solution
-        Of a joint of plates.
+        Of a joint of plates, or of superelements with recovery matrices.
 
     Returns
     -------
     Stresses
-        Of each part at the 2 × 2 Gauss points of its elements, N/mm², on the face in the direction of
-        positive displacements; on the other face they have the other sign.
+        N/mm². Of plates at the 2 × 2 Gauss points of each element, on the face in the direction of positive
+        displacements; on the other face they have the other sign. Of superelements at their points.
 
     Raises
     ------
     InputError
-        If the parts are superelements, or matrices were given.
+        If no part has stresses, or a recovery matrix is wrong.
 
     Examples
     --------
@@ -146,8 +158,11 @@ def stresses(solution: Solution) -> Stresses:
     """
     problem, reference = solution.problem, solution.problem.reference
     parts = stresses_of(problem.scene, solution.unknowns)
-    energy = proof_of(problem.prepared).energy_error(problem.load, reference.x, reference.lam)
+    proof = proof_of(problem.prepared)
+    energy = proof.energy_error(problem.load, reference.x, reference.lam)
     errors = [part.sensitivity * energy for part in parts]
+    for k, (part, at) in enumerate(_superelements(problem.scene)):
+        errors[k] = energy * _sensitivity(part.recovery.S, at, proof)
     if not solution.from_reference:
         exact = stresses_of(problem.scene, reference.x)
         for part, other, error in zip(parts, exact, errors, strict=True):
@@ -157,7 +172,8 @@ def stresses(solution: Solution) -> Stresses:
 
 def stresses_of(scene: Scene, x: Vector) -> tuple[PartStress, ...]:
     """The stresses of each part. x : (n,) at the junction or û (N,), mm. Raises InputError as `stresses`."""
-    refuse_without_plates(scene)
+    if elements := _superelements(scene):
+        return tuple(part.recovery.stress(part.name, x[at]) for part, at in elements)
     assert isinstance(scene, JointScene)
     model = model_of(scene)
     assert isinstance(model, JointModel)
@@ -167,10 +183,30 @@ def stresses_of(scene: Scene, x: Vector) -> tuple[PartStress, ...]:
     )
 
 
-def refuse_without_plates(scene: Scene) -> None:
-    """Raise InputError if a scene has no plates."""
-    if not isinstance(scene, JointScene) or not isinstance(scene.joint, Joint):
+def _superelements(scene: Scene) -> list[tuple[Any, slice]]:
+    """The superelements, and their unknowns; none of plates. Raises InputError if no part has stresses."""
+    joint: Any = getattr(scene, "joint", None)
+    if isinstance(joint, Joint):
+        return []
+    if joint is None or not any(part.stress_files for part in joint.parts):
         raise InputError.one("stress", "scene", scene.name, NONE)
+    return [(part, joint.unknowns(part.name)) for part in joint.parts]
+
+
+def _sensitivity(S: sp.csr_array, at: slice, proof: Proof) -> Vector:
+    """(k,) that of the points of a recovery matrix S (3k, n) of the unknowns `at`; see PartStress."""
+    units, norms = proof.balanced, np.zeros(S.shape[0])
+    for start in range(0, len(norms), ROWS):
+        rows = slice(start, start + ROWS)
+        s = np.zeros((len(units.D), len(norms[rows])))
+        s[at] = S[rows].toarray().T
+        s *= units.D
+        z = units.solve(s)
+        r = length(s - units.D * units.assembly.K.multiply(units.D * z))
+        r += gamma(len(s) + 2) * (length(s) + units.stiffest * length(z))
+        norms[rows] = units.energy(z) + SAFE * r / np.sqrt(proof.kappa)
+    xx, yy, xy = norms.reshape(-1, 3).T
+    return np.asarray(SAFE * np.sqrt(1.5 * (xx**2 + yy**2) + 3 * xy**2))
 
 
 def _forces(scene: JointScene, part: str) -> Matrix:

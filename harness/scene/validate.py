@@ -58,6 +58,10 @@ def validate(scene: str | Path, *, reporter: Reporter = SILENT) -> Size | None:
     """
     read, console = read_scene(str(scene)), console_of(reporter)
     size = size_of(read)
+    if isinstance(read, JointScene) and read.output.stress:
+        from .stress import refuse_unusable  # only what a scene calls for
+
+        refuse_unusable(None, read)
     if isinstance(read, JointScene) and isinstance(read.joint, Joint):
         assert size is not None
         _plates(read, size, console)

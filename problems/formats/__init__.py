@@ -115,8 +115,8 @@ def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tu
         if len(hits) == 1:
             return hits
         wanted = matrix or f"{name}, or one matrix alone"
-        how = f'choose one by matrix = "NAME" in a part, {name}=FILE:NAME for import'
-        raise InputError.one(path, "matrices", list(names), f"a matrix {wanted}; {how}")
+        how = f'; choose one by matrix = "NAME" in a part, {name}=FILE:NAME for import' * (name in NAMES)
+        raise InputError.one(path, "matrices", list(names), f"a matrix {wanted}{how}")
 
     ((chosen, (M, labels)),) = read_labelled(path, choose).items()
     others += matrix_files.texts_of(path)

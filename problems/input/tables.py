@@ -36,7 +36,7 @@ LENGTHS |= dict.fromkeys(("um", "\u03bcm"), Fraction("0.001"))
 LENGTHS |= dict.fromkeys(("in", "inch", '"'), Fraction("25.4"))
 #: The units of columns that are no lengths, by name.
 UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT)
-WORDS = ("name", "stage")  # headings of columns of words
+WORDS = ("name", "stage", "side")  # headings of columns of words
 BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))
 HEADING = re.compile(rf"(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
 PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
@@ -89,7 +89,7 @@ class Rows:
     """The good rows of a file, with their line numbers, and the faults of the others.
 
     columns : the names of the columns that are there, in the order of the cells of a row.
-    words : the cell of each row under the headings "name" and "stage"; empty without such a column.
+    words : the cell of each row under each heading of WORDS; empty without such a column.
     """
 
     path: Path

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Mask, Matrix, Vector
+from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
 from .part import PartLoadEffect, PartModel
 from .plate import shape
@@ -33,11 +33,12 @@ TOUCHED = 1.5  # elements around the place of a force
 
 @dataclass(frozen=True)
 class PartStress:
-    """Stresses of the top face of a part, N/mm², at k points; those of the bottom face are the negative ones.
+    """Stresses of a part, N/mm², at k points.
 
     places : (k, 2) x and y, mm. components : (k, 3) σ_xx, σ_yy, τ_xy. sensitivity : (k,) the most that any of
     them, or the von Mises stress, changes per √(N·mm) of ‖e‖_K. near_force : (k,) whether a force at a point
-    acts on the element or the next one, where the plate's own moment has no limit.
+    acts on the element or the next one, where the plate's own moment has no limit. side : (k,) 1 top face, -1
+    bottom, 0 top of two, of which the bottom has the negative ones.
     """
 
     part: str
@@ -45,10 +46,11 @@ class PartStress:
     components: Matrix
     sensitivity: Vector
     near_force: Mask
+    side: Indices
 
     @property
     def von_mises(self) -> Vector:
-        """(k,) √(σ_xx² − σ_xx σ_yy + σ_yy² + 3 τ_xy²), on either face."""
+        """(k,) √(σ_xx² − σ_xx σ_yy + σ_yy² + 3 τ_xy²)."""
         x, y, xy = self.components.T
         return np.sqrt(x**2 - x * y + y**2 + 3 * xy**2)
 
@@ -92,7 +94,7 @@ def part_stress(
     near = np.zeros(len(places), dtype=bool)
     for force in forces:
         near |= (abs(places - force) <= TOUCHED * sizes).all(axis=1)
-    return PartStress(name, places, components, sensitivity, near)
+    return PartStress(name, places, components, sensitivity, near, np.zeros(len(places), dtype=np.intp))
 
 
 def _line(grid: Vector) -> tuple[Vector, Vector, list[sp.csr_array]]:

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Protocol
 import numpy as np
 import scipy.linalg as sla
 import scipy.sparse as sp
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from problems import storage
 from problems.errors import InputError
@@ -43,7 +43,7 @@ class SuperelementTable(Table):
     """A [[joint.part]]: the files of K and of its nodes.
 
     matrix : the name of K in a file with several. rows, dofs : which node and degree of freedom each row of K
-    is, if the file of K has no labels; dofs is (3,) by default.
+    is, if the file of K has no labels; dofs is (3,) by default. stress, stress_points : see stress_recovery.
     """
 
     name: Name
@@ -52,6 +52,8 @@ class SuperelementTable(Table):
     matrix: Annotated[str, Field(min_length=1)] | None = None
     rows: Order | None = None
     dofs: Annotated[tuple[Dof, ...], Field(min_length=1, max_length=6)] | None = None
+    stress: str | None = None
+    stress_points: str | None = None
 
     @field_validator("dofs")
     @classmethod
@@ -59,6 +61,12 @@ class SuperelementTable(Table):
         if dofs and len(set(dofs)) < len(dofs):
             raise ValueError("must name each once")
         return dofs
+
+    @model_validator(mode="after")
+    def _both_or_none(self) -> "SuperelementTable":
+        if (self.stress is None) != (self.stress_points is None):
+            raise ValueError("must have both of stress and stress_points, or none")
+        return self
 
 
 class StiffnessSource(Protocol):
@@ -114,6 +122,7 @@ class Superelement:
     file : that of K, or the scene, for messages. content : a hash of its data, without that of code.
     dofs : the degrees of freedom of each node, for a K without labels.
     node, dof (n,) : the node, an index into `nodes`, and the degree of freedom of each unknown.
+    stress_files : the recovery matrix and its points, or none; in no key.
     """
 
     name: str
@@ -124,6 +133,7 @@ class Superelement:
     nodes: Nodes
     node: Indices
     dof: Indices
+    stress_files: tuple[Path, ...] = ()
 
     @classmethod
     def of(cls, folder: Path, table: SuperelementTable) -> "Superelement":
@@ -143,7 +153,8 @@ class Superelement:
         node, dof = rows_of(path, folder / table.nodes, nodes, entry[0], table.dofs, table.rows)
         content = [array.tolist() for array in (nodes.xyz, nodes.normal, nodes.contact, node, dof)]
         dofs, key = table.dofs or NORMAL_ALONE, storage.digest((source.content, source.matrix), content)
-        part = cls(table.name, path, key, source, dofs, nodes, node, dof)
+        files = tuple(folder / each for each in (table.stress, table.stress_points) if each is not None)
+        part = cls(table.name, path, key, source, dofs, nodes, node, dof, files)
         if (lost := part._lost).size:
             where = f"{len(lost)} nodes of the contact surface, ids {listed(map(str, nodes.ids[lost]))}"
             allowed = "K must keep the displacement along the normal of each; contact = 0 excepts a node"
@@ -173,6 +184,13 @@ class Superelement:
     @property
     def sparse(self) -> bool:
         return bool(self.source.stored()[1]["sparse"])
+
+    @cached_property
+    def recovery(self) -> Any:
+        """The StressRecovery, of no point without files. Raises InputError."""
+        from .stress_recovery import StressRecovery  # only what a scene calls for
+
+        return StressRecovery.of(self.stress_files, self.size)
 
     @cached_property
     def contacts(self) -> Indices:

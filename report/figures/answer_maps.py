@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from report.results.answer_record import Answer, pair_name, stages, von_mises
+from report.results.answer_record import Answer, pair_name, stages, stress_map, von_mises
 
 from . import style
 from .deformed_faces import deformed_figure
@@ -132,11 +132,11 @@ def _stress(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     scale = rooted("von Mises stress, N/mm²", "cividis", np.where(near, 0.0, values))
     maps = []
     for k, part in enumerate(record["parts"]):
-        here = arrays["stress_part"] == k
-        outlines = [(near[here], LARGER, "not to be read")]
+        places, highest, unread = stress_map(arrays, k)
+        outlines = [(unread, LARGER, "not to be read")]
         title = f"von Mises stress of {part['name']}"
-        places, marks = arrays["stress_places"][here], _marks(record, part)
-        maps.append(Map(title, places, values[here], scale, outlines, marks))
+        if len(places):
+            maps.append(Map(title, places, highest, scale, outlines, _marks(record, part)))
     return drawn(maps, len(maps))[0]
 
 

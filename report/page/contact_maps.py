@@ -12,7 +12,7 @@ import numpy as np
 from report.document.numbers import counted, without_rounding
 from report.figures.junction_maps import cell_edges, grid_of
 from report.page.page_file import Data, choice, entry, exact, packed
-from report.results.answer_record import pair_name, von_mises
+from report.results.answer_record import pair_name, stress_map
 from report.results.reader import Results
 from report.results.series_results import Array, Series
 
@@ -48,15 +48,15 @@ def scene_maps(results: Results) -> Data:
 
 
 def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
-    """The maps of one answer, one per pair of parts in contact, and one of the stress in each plate."""
+    """The maps of one answer, one per pair of parts in contact, and one of the stress in each part."""
     fields = {text: arrays[name] for name, text in FIELDS.items()}
     gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
     page = _pairs(record, fields | {f"gap of {stage['name']}": gap for stage, gap in gaps}, arrays)
     for k, part in enumerate(record["parts"] if "stress" in arrays else ()):
-        here = arrays["stress_part"] == k
-        values = np.where(arrays["stress_near_force"], np.nan, von_mises(arrays))[here]
-        name = f"stress of {part['name']}"
-        _added(page, name, arrays["stress_places"][here], {STRESS: values}, _marked(record), noun="place")
+        places, highest, unread = stress_map(arrays, k)
+        values, name = np.where(unread, np.nan, highest), f"stress of {part['name']}"
+        if len(places):
+            _added(page, name, places, {STRESS: values}, _marked(record), noun="place")
     return page
 
 

@@ -42,17 +42,18 @@ def contacts(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
 
 
 def stresses(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
-    """One line per place of each plate and side, N/mm²; the bottom has the stresses of the top, negative."""
+    """One line per place and side, N/mm²; where `stress_side` is 0, the bottom has the negative ones, too."""
     names = np.array([part["name"] for part in record["parts"]])
     x, y = arrays["stress_places"].T
     places = {"part": names[arrays["stress_part"]], "x": x, "y": y}
     value = {"von_mises": von_mises(arrays), "proven_error": arrays["stress_error"]}
     value["not_to_be_read"] = np.where(arrays["stress_near_force"], "force at a point", "")
-    sides = []
+    sides, of_side = [], arrays["stress_side"]
     for side, sign in (("top", 1.0), ("bottom", -1.0)):
-        signed = (sign * arrays["stress"]).T
+        signed = np.where(of_side == 0, sign, 1.0) * arrays["stress"].T
         components = dict(zip(("sxx", "syy", "sxy"), signed, strict=True))
-        sides.append(pd.DataFrame(places | {"side": side} | components | value))
+        lines = pd.DataFrame(places | {"side": side} | components | value)
+        sides.append(lines[(of_side == 0) | (of_side == sign)])
     return pd.concat(sides, ignore_index=True)
 
 
@@ -60,6 +61,14 @@ def von_mises(arrays: dict[str, Array]) -> Array:
     """(k,) von Mises' stress at the places of `stress`, N/mm²."""
     xx, yy, xy = arrays["stress"].T
     return np.asarray(np.sqrt(xx**2 - xx * yy + yy**2 + 3 * xy**2))
+
+
+def stress_map(arrays: dict[str, Array], part: int) -> tuple[Array, Array, Any]:
+    """x, y (k, 2) of a part's places, the larger von Mises stress of their sides, whether not to be read."""
+    values, here = von_mises(arrays), np.flatnonzero(arrays["stress_part"] == part)
+    here = here[np.argsort(-values[here], kind="stable")]
+    here = np.sort(here[np.unique(arrays["stress_places"][here], axis=0, return_index=True)[1]])
+    return arrays["stress_places"][here], values[here], arrays["stress_near_force"][here]
 
 
 def fasteners(record: dict[str, Any]) -> pd.DataFrame:

@@ -40,7 +40,7 @@ CAPTIONS = {
     "deformed": "*The parts around the largest gap*, not to scale: the first grey, the second coloured by "
     "the gap left.",
     "gap": "*The gap before and after*, on square-root scales; outlined: closed contacts.",
-    "stress": "*The bending stress of the plates*, by von Mises, on a square-root scale; outlined: near a "
+    "stress": "*The stress of the parts*, by von Mises, on a square-root scale; outlined: near a "
     "force at a point, where the moment of a plate has no limit.",
     "forces": "*The contact forces*, on a square-root scale; outlined: closed contacts.",
     "displacement": "*The displacements*, positive from the first part of a contact to the second; hatched: "
@@ -175,13 +175,14 @@ def write_vtu(
 
 
 def grid_with_stresses(record: dict[str, Any], arrays: dict[str, Any]) -> Grid:
-    """Points, cells and point data of the stresses on the top face, N/mm²; not_to_be_read is 0 or 1."""
+    """Points, cells and point data of the stresses, N/mm²; side as in `PartStress`; not_to_be_read 0 or 1."""
     part, places = arrays["stress_part"], arrays["stress_places"]
     components = dict(zip(("sxx", "syy", "sxy"), arrays["stress"].T, strict=True))
     data = {"part": part.astype(float), **components, "von_mises": von_mises(arrays)}
+    data["side"] = arrays["stress_side"].astype(float)
     data["not_to_be_read"] = arrays["stress_near_force"].astype(float)
     starts = np.searchsorted(part, np.arange(len(record["parts"]) + 1))
-    blocks = [_cells(places[a:b], int(a)) for a, b in itertools.pairwise(starts)]
+    blocks = [_cells(places[a:b], int(a)) for a, b in itertools.pairwise(starts) if a < b]
     return np.column_stack([places, np.zeros(len(places))]), blocks, data
 
 

@@ -190,7 +190,7 @@ def test_forces_at_points_are_named() -> None:
     assert not part.near_force.all()
 
 
-def test_superelements_have_none() -> None:
+def test_superelements_without_recovery_have_none() -> None:
     with pytest.raises(InputError, match="only plates have stresses"):
         stresses_of(read_scene("drawn/superelements/0"), np.zeros(1))
 
@@ -225,7 +225,7 @@ def test_every_stress_is_written(tmp_path: Path) -> None:
     mesh = meshio.read(out / "stress.vtu")
     assert mesh.cells[0].type == "quad"
     np.testing.assert_allclose(mesh.point_data["sxx"], table[table["side"] == "top"]["sxx"])
-    assert "![The bending stress of the plates](stress.png)" in (out / "answer.md").read_text("utf-8")
+    assert "![The stress of the parts](stress.png)" in (out / "answer.md").read_text("utf-8")
     assert f"stress of {found.parts[0].part}" in (out / "index.html").read_text("utf-8")
     assert (out / "stress.png").stat().st_size > 0
 
