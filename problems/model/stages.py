@@ -69,20 +69,20 @@ class Plan:
         self.counts = [effect.element_count(self.joint) for effect in self.effects]
         taken = [self._named(k, "off", stage.off) for k, stage in enumerate(self.stages)]
         put = [
-            self._named(k, "on", stage.on) | self._of_files(stage.name) for k, stage in enumerate(self.stages)
+            self._named(k, "on", stage.on) + self._of_files(stage.name) for k, stage in enumerate(self.stages)
         ]
-        self.staged = {element for sets in (*taken, *put) for some in sets.values() for element in some}
+        self.staged = {element for sets in (*taken, *put) for _, some in sets for element in some}
         everything = ((number, k) for number, count in enumerate(self.counts) for k in range(max(count, 1)))
         acting = frozenset(everything) - self.staged
         if not self.stages:
             self.steps.append(Acting("", acting, frozenset()))
         for number, (stage, off, on) in enumerate(zip(self.stages, taken, put, strict=True)):
             fresh: Elements = frozenset()
-            for reference, elements in off.items():
+            for reference, elements in off:
                 if not elements <= acting:
                     self._fault(number, "off", reference, "what acts: this is taken out before it is set")
                 acting -= elements
-            for reference, elements in on.items():
+            for reference, elements in on:
                 if elements & acting:
                     self._fault(number, "on", reference, "what does not act yet: this is set twice")
                 acting, fresh = acting | elements, fresh | elements
@@ -91,19 +91,20 @@ class Plan:
     def _fault(self, number: int, key: str, value: str, allowed: str) -> None:
         self.wrong.append((f"stage[{number}] ({self.stages[number].name}).{key}", value, allowed))
 
-    def _of_files(self, stage: str) -> dict[str, Elements]:
+    def _of_files(self, stage: str) -> list[tuple[str, Elements]]:
         """The elements whose row in a file names the stage, by the name or kind of the effect."""
-        return {
-            f"column stage of {effect.name or effect.kind}": frozenset(
-                (number, k) for k, word in enumerate(effect._stages) if word == stage
+        return [
+            (
+                f"column stage of {effect.name or effect.kind}",
+                frozenset((number, k) for k, word in enumerate(effect._stages) if word == stage),
             )
             for number, effect in enumerate(self.effects)
-        }
+        ]
 
-    def _named(self, number: int, key: str, references: Sequence[str]) -> dict[str, Elements]:
+    def _named(self, number: int, key: str, references: Sequence[str]) -> list[tuple[str, Elements]]:
         """The elements of each entry of a stage that is right."""
         names = {effect.name: k for k, effect in enumerate(self.effects) if effect.name is not None}
-        sets: dict[str, Elements] = {}
+        sets: list[tuple[str, Elements]] = []
         for reference in references:
             match = None if reference in names else SLICE.fullmatch(reference)
             name = match[1] if match else reference
@@ -116,7 +117,7 @@ class Plan:
                 has = f"0 <= a < b <= {count}, its points" if count else "no [a:b]: it has no points"
                 self._fault(number, key, reference, f"{name} with {has}")
             else:
-                sets[reference] = frozenset((effect, k) for k in range(start, stop))
+                sets.append((reference, frozenset((effect, k) for k in range(start, stop))))
         return sets
 
     def faults(self) -> Faults:

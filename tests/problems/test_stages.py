@@ -252,6 +252,8 @@ SUPPORTS = [[0.0, 10.0], [400.0, 10.0], [200.0, 200.0]]
 BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"name": "1", "on": ["clamp"]}], {}, "stage[0] (1).on = 'clamp'", "did you mean clamps?"),
     ([CLAMP, {"name": "2", "on": ["clamps[0:1]"]}], {}, "stage[1] (2).on = 'clamps[0:1]'", "set twice"),
+    ([{"name": "1", "on": ["clamps", "clamps"]}], {}, "stage[0] (1).on = 'clamps'", "set twice"),
+    ([CLAMP, RELEASE | {"off": ["clamps"] * 2}], {}, "stage[1] (release).off = 'clamps'", "before it is set"),
     ([RELEASE], {}, "stage[0] (release).off = 'clamps'", "before it is set"),
     ([{"name": "1", "on": ["rivets[2:9]"]}], {}, "'rivets[2:9]'", "0 <= a < b <= 4"),
     ([{"name": "1", "on": ["tool[0:1]"]}], {}, "'tool[0:1]'", "it has no points"),
@@ -329,3 +331,17 @@ def test_a_superelement_that_a_stage_leaves_free_is_named_with_the_stage(tmp_pat
         InputError, match=r"part\.b, in stage let go = 'translation along z.*no free rigid motion"
     ):
         solve(joined(stages, [EFFECTS[0], holds], {"part": parts}))
+
+
+def test_two_files_of_effects_of_one_kind_without_names(tmp_path: Path) -> None:
+    effects, rivet = EFFECTS[:2], {"kind": "installed_fasteners", "stiffness": 1e4}
+    for k, points in enumerate((RIVETS[:2], RIVETS[2:])):
+        rows = [f"{x},{y},{stage}\n" for (x, y), stage in zip(points, ["first", "second"], strict=True)]
+        (tmp_path / f"{k}.csv").write_text("x,y,stage\n" + "".join(rows))
+        effects = [*effects, rivet | {"file": str(tmp_path / f"{k}.csv")}]
+    scene = joined([CLAMP, {"name": "first"}, {"name": "second"}], effects)
+    counts = [
+        sum(effect.element_count(stage.joint) for effect in stage.effects if effect.kind == rivet["kind"])
+        for stage in stage_scenes(scene).values()
+    ]
+    assert counts == [0, 2, 4]
