@@ -128,6 +128,9 @@ class Plan:
                 if name is not None and name in names[:number]:
                     allowed = f"a name of its own: {where}[{names.index(name)}] has it"
                     yield f"{where}[{number}].name", name, allowed
+        for number, effect in enumerate(self.effects):
+            if effect.name == "contacts":
+                yield f"effect[{number}].name", effect.name, "another name: the forces of contacts have it"
         yield from self.wrong
         for number, effect in enumerate(self.effects):
             where = f"effect[{number}] ({effect.kind})"

@@ -274,6 +274,7 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
         "or none: 3 is in none",
     ),
     ([CLAMP], {"name": "clamps"}, "effect[2].name = 'clamps'", "effect[1] has it"),
+    ([CLAMP], {"name": "contacts"}, "effect[2].name = 'contacts'", "the forces of contacts"),
     (
         [{"name": "1", "on": ["rivets"]}],
         {"points": PIN},
