@@ -111,6 +111,8 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
             return "required"
         case "model_type" | "model_attributes_type":
             return "must be a table"
+        case "tuple_type":
+            return "must be a list"
     message = item["msg"].removeprefix("Value error, ").replace(" after validation", "")
     return re.sub("^(Input|String|Tuple) should", "must", message)
 

@@ -259,6 +259,7 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"name": "1", "on": ["tool[0:1]"]}], {}, "'tool[0:1]'", "it has no points"),
     ([CLAMP, {"name": "clamp"}], {}, "stage[1].name = 'clamp'", "stage[0] has it"),
     ([{"on": ["clamps"]}], {}, "stage[0].name", "required"),
+    ([CLAMP | {"on": "clamps"}], {}, "stage[0].on = 'clamps'", "must be a list"),
     ([CLAMP | {"of": []}], {}, "stage[0].of", "did you mean off?"),
     (
         [{"name": "1", "on": ["rivets"]}],
