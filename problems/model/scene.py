@@ -133,6 +133,9 @@ class JointScene(Scene):
         """A sentence on each parameter that is possible but rarely meant."""
         told = [("joint", self.joint.unusual())]
         told += [(effect.kind, effect.unusual(self.joint)) for effect in self.effects]
+        if not self.stages:
+            usual = [("stage", "a column", "in a scene with stages; here all points act at once")]
+            told += [(effect.kind, iter(usual)) for effect in self.effects if any(effect._stages)]
         return [
             f"{where}.{key} = {shown} is unusual; usual is {usual}"
             for where, some in told

@@ -347,3 +347,5 @@ def test_two_files_of_effects_of_one_kind_without_names(tmp_path: Path) -> None:
         for stage in stage_scenes(scene).values()
     ]
     assert counts == [0, 2, 4]
+    (warning,) = joined([], effects[:3]).unusual
+    assert warning.startswith("installed_fasteners.stage = a column is unusual")
