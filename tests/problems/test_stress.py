@@ -23,9 +23,16 @@ from problems.model.part import PartModel
 from problems.model.plate import Plate, line_loads
 from problems.model.stress import PartStress, part_stress
 from problems.scene_files import SCENES, read_scene
+from report.figures.answer_maps import answer_figures
 
 NOWHERE = np.zeros((0, 2))
+FIGURES = "report.writers.answer_report.answer_figures"
 E, NU, T, SIDE, Q = 70e3, 0.3, 2.0, 100.0, 0.01
+
+
+@pytest.fixture(autouse=True)
+def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FIGURES, lambda *_: {})
 
 
 def square(elements: int) -> Plate:
@@ -207,7 +214,9 @@ def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str)
         assert f"{word}: limit {allowed} N/mm²" in (tmp_path / "a/answer.md").read_text("utf-8")
 
 
-def test_every_stress_is_written(tmp_path: Path) -> None:
+def test_every_stress_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its map, too; the other pictures of the answer are not drawn into files."""
+    monkeypatch.setattr(FIGURES, lambda *answer: {"stress": answer_figures(*answer)["stress"]})
     scene, out = "gallery/installed-fasteners", tmp_path / "a"
     limits = ("--allow-stress", 1e3, "--allow-gap", 1e-4)
     done = harness("solve", scene, *limits, "--out", out)
