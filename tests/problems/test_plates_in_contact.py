@@ -11,31 +11,24 @@ docs/effects.md is not.
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import clarabel
 import numpy as np
 import pytest
 import scipy.sparse as sp
-import skfem
-from numpy.typing import NDArray
+from argyris_plates import Array, deflections, held
 from sample_size import ASKED
-from skfem.helpers import dd, ddot, eye, trace
 
 from harness.solving.session import answer_of
 from problems.build import load_case, prepared
-from problems.model.joint import Joint, Part
+from problems.model.joint import Joint
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene, scene_of
 from solvers.registry import make_solver
 
-Array = NDArray[np.float64]
-
 EFFECTS = Path(__file__).parents[2] / "docs" / "effects.md"
 NAMES = ["gallery/three-part-stack", "docs/effects.md", *(["gallery/measured-gap"] if ASKED else [])]
 ELEMENT = 25.0  # mm, the side of a triangle; the scenes have a node every 15 mm
-UNIT = 200.0  # mm; scikit-fem inverts matrices of powers of the coordinates, which are best near one
-CLAMPED = ("u", "u_x", "u_y", "u_xx", "u_xy", "u_n")  # zero along a clamped edge y = const: all but w_yy
 
 
 def scene_named(name: str) -> JointScene:
@@ -70,13 +63,6 @@ def reactions(joint: Joint, f: Array, lam: Array) -> Array:
     return sums
 
 
-@skfem.BilinearForm  # type: ignore[untyped-decorator]
-def bending(u: Any, v: Any, w: Any) -> Any:
-    """Of rigidity one: ∫ (1 − ν) κ(u):κ(v) + ν tr κ(u) tr κ(v)."""
-    kappa = dd(u)
-    return ddot((1 - w.poisson) * kappa + w.poisson * eye(trace(kappa), 2), dd(v))
-
-
 def contact(joint: Joint, forces: Array, g: Array) -> tuple[Array, Array]:
     """The gaps that are left, mm, and the contact forces, N, pair after pair, at the nodes of the joint.
 
@@ -84,9 +70,9 @@ def contact(joint: Joint, forces: Array, g: Array) -> tuple[Array, Array]:
     """
     stiffness, e, force = [], {}, []
     for part, at_nodes in zip(joint.part, forces, strict=True):
-        basis, K, free = held(joint, part)
+        basis, K, free = held(joint, part, ELEMENT)
         stiffness.append(K[free][:, free])
-        e[part.name] = sp.csr_array(basis.probes(joint.nodes.T / UNIT))[:, free]
+        e[part.name] = deflections(basis, joint.nodes)[:, free]
         force.append(e[part.name].T @ at_nodes)
     sides = [[((name == a) - (name == b)) * e[name] for name in e] for a, b in joint.pairs]
     B, K, f = sp.block_array(sides, format="csc"), sp.block_diag(stiffness), np.concatenate(force)
@@ -101,22 +87,3 @@ def contact(joint: Joint, forces: Array, g: Array) -> tuple[Array, Array]:
     u, lam = np.array(answer.x), np.array(answer.z)
     assert abs(K @ u + B.T @ lam - f).max() < 1e-9 * abs(f).max()
     return g - B @ u, lam
-
-
-def held(joint: Joint, part: Part) -> tuple[Any, sp.csr_array, NDArray[np.intp]]:
-    """Basis and K, N/mm, of a part, two triangles per rectangle; what is free beside its clamped edges."""
-    south = -part.south.length if part.south else 0.0
-    north = joint.junction.width + (part.north.length if part.north else 0.0)
-    x, y = (
-        np.linspace(*ends, round((ends[1] - ends[0]) / ELEMENT) + 1) / UNIT
-        for ends in ((0.0, joint.junction.length), (south, north))
-    )
-    basis = skfem.Basis(skfem.MeshTri.init_tensor(x, y), skfem.ElementTriArgyris(), intorder=8)
-    rigidity = part.young * part.thickness**3 / 12 / (1 - part.poisson**2)
-    K = sp.csr_array(bending.assemble(basis, poisson=part.poisson) * (rigidity / UNIT**2))
-    fixed = np.zeros(basis.N, dtype=bool)
-    for edge in part.clamped:
-        line = {"south": south, "north": north}[edge] / UNIT
-        facets = basis.mesh.facets_satisfying(lambda p, line=line: np.isclose(p[1], line))
-        fixed[basis.get_dofs(facets).all(CLAMPED)] = True
-    return basis, K, np.flatnonzero(~fixed)
