@@ -1,8 +1,8 @@
 """Takes each load case of a series through the stages of its scene, a block of cases at a time.
 
 The cases are those of the last stage. In stage s case k has the forces f_k + f_s − f + T(k a_k) and the gaps
-g_k + g_s − g, with f and g of the last stage without approaches, and a_k what the fasteners of s have locked
-in this case. Stages with the same K share its factors and the state of the solver.
+g_k + g_s − g, with f and g of the last stage, f_s without approaches, and a_k what the fasteners of s have
+locked in this case. Stages with the same K share its factors and the state of the solver.
 """
 
 from collections.abc import Iterator, Sequence
@@ -71,7 +71,7 @@ class StagedSession:
         assert isinstance(job.scene, JointScene)
         self.job, self.scene = job, job.scene
         self.sessions: list[SeriesSession] = []
-        self.last = self._load(last_scene(job.scene), job.form)
+        self.last = load_case(last_scene(job.scene), job.form)
 
     @staticmethod
     def _load(scene: Scene, form: Form) -> LoadCase:
@@ -130,8 +130,9 @@ class StagedSession:
             return Result(row | {"stages_max_gap_mm": gaps}, gap)
         name, other = failed
         said = f"stage {name}: {other['message'] or other['verdict']}"
-        row = row | {"verdict": other["verdict"], "message": said, "stages_max_gap_mm": gaps}
-        return Result(row, gap if other["verdict"] != "no_answer" else None)
+        if other["verdict"] == "no_answer":  # later stages have locked nothing that counts
+            row, gap = other, None
+        return Result(row | {"verdict": other["verdict"], "message": said, "stages_max_gap_mm": gaps}, gap)
 
 
 def session_of(job: Job) -> SeriesSession | StagedSession:

@@ -40,6 +40,11 @@ kind = "installed_fasteners"
 name = "rivets"
 preload = 30.0
 {POINTS}
+[[effect]]
+kind = "installed_fasteners"
+stiffness = 5e3
+approach = 0.03
+points = [[10.0, 40.0]]
 [[stage]]
 name = "tack"
 on = ["tacks"]
