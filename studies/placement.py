@@ -21,8 +21,9 @@ import numpy as np
 import pandas as pd
 
 from harness.placement.candidates import ROWS, MovableFasteners, Place, Plan, grid, plan_of
-from harness.placement.search import Search, Step, onto
-from harness.placement.session import Outcome, PlanSession, Question, Study
+from harness.placement.plan_search import Step
+from harness.placement.search import Search, onto
+from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question
 from problems.forms.assembly import Matrix
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import scene_of
@@ -69,7 +70,7 @@ def opened(
     fasteners = {"kind": "fasteners", "preload": preload, "pattern": {"columns": 5, "rows": 1}}
     movable = MovableFasteners.of(scene_of({"title": "", "joint": table, "effect": [gap, fasteners]}))
     gaps = random_gaps(movable.bare, cases, 0)
-    return movable, PlanSession(Study(movable.bare, movable.fastener, gaps, "dual"))
+    return movable, PlanSession(FastenerStudy(movable.bare, gaps, "dual", movable.fastener))
 
 
 def search_of(
@@ -78,7 +79,7 @@ def search_of(
     ask, nodes = Counted(session), session.data.assembly.contact_nodes
     assert nodes is not None
     study = session.study
-    return Search(ask, study.bare, nodes, candidates, study.cases.count, allowed, limit), ask
+    return Search(ask, study.cases.count, allowed, limit, study.bare, nodes, candidates), ask
 
 
 def searched(search: Search) -> Step:

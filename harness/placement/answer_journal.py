@@ -62,4 +62,4 @@ class AnswerJournal:
 
 def _outcome(row: dict[str, Any]) -> Outcome:
     largest = tuple(inf if value is None else value for value in row["largest"])
-    return Outcome(largest, tuple(row["contact"]), tuple(row["mean"]))
+    return Outcome(largest, tuple(row["contact"]), tuple(row["mean"]), tuple(map(tuple, row["further"])))

@@ -18,11 +18,11 @@ A table of measured gaps is finite: its odd rows are held back, and there is one
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import count, islice
-from math import ceil, comb, floor, log, log10
+from itertools import count
+from math import ceil, floor, log, log10
 
 from harness.placement.candidates import Plan
-from harness.placement.search import FEW, PLANS, Search, Step, Values
+from harness.placement.plan_search import PlanSearch, Step
 from problems.errors import InputError
 from report.document.numbers import counted
 
@@ -106,7 +106,8 @@ class Sample:
     """A plan in fresh cases.
 
     step : its gap_mm is the limit that all but c of them keep. cases : what they are called. kept : how many
-    keep the goal's limit, or gap_mm if there is none. interval : of the share of all cases that do.
+    keep the goal's limit, or gap_mm if there is none. interval : of the share of all cases that do. item :
+    what plans are made of.
     """
 
     step: Step
@@ -114,9 +115,12 @@ class Sample:
     cases: str
     kept: int
     interval: tuple[float, float]
+    item: str
 
     @classmethod
-    def of(cls, plan: Plan, search: Search, goal: Goal, cases: Cases, fresh: slice, alpha: float) -> "Sample":
+    def of(
+        cls, plan: Plan, search: PlanSearch, goal: Goal, cases: Cases, fresh: slice, alpha: float
+    ) -> "Sample":
         """fresh : which of the cases' numbers."""
         from scipy.stats import binomtest
 
@@ -127,12 +131,13 @@ class Sample:
         kept = sum(gap <= limit for gap in step.outcome.largest)
         low, high = binomtest(kept, count).proportion_ci(1 - alpha, "exact")
         name = "held-back row" if cases.table else "fresh case"
-        return cls(step, numbers, f"{name}s" if count > 1 else name, kept, (float(low), float(high)))
+        name = f"{name}s" if count > 1 else name
+        return cls(step, numbers, name, kept, (float(low), float(high)), search.item)
 
     def sentence(self, goal: Goal, which: str = "") -> str:
         """3 fasteners keep 0.12 mm in 96.7 % of 300 fresh cases (95 % interval 94.0 to 98.4 %)"""
         step, cases = self.step, len(self.numbers)
-        plan = f"{which}{counted(len(step.plan), 'fastener')} {'keeps' if len(step.plan) == 1 else 'keep'}"
+        plan = f"{which}{counted(len(step.plan), self.item)} {'keeps' if len(step.plan) == 1 else 'keep'}"
         digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
         share, low, high = (f"{100 * value:.{digits}f}" for value in (self.kept / cases, *self.interval))
         limit = f"{step.gap_mm:.3g}" if goal.limit_mm is None else f"{goal.limit_mm:g}"
@@ -157,14 +162,14 @@ class Found:
     order: list[Step]
 
 
-def search_in_rounds(search: Search, current: Plan, goal: Goal, cases: Cases) -> Found:
+def search_in_rounds(search: PlanSearch, current: Plan, goal: Goal, cases: Cases) -> Found:
     """Search, and let fresh cases decide, until a plan passes or no round is left. current : the scene's own
     plan, for comparison.
     """
     used, choosing, samples = cases.choosing, cases.choosing, list[Sample]()
     while True:
         now = search.among(cases.numbers[:choosing], goal.allowed(choosing))
-        steps, best = search_once(now, current, goal)
+        steps, best = now.once(current, goal.count)
         enough = more_may_help = goal.limit_mm is None or best.gap_mm <= goal.limit_mm
         if len(cases.numbers) == 1:
             break
@@ -180,24 +185,5 @@ def search_in_rounds(search: Search, current: Plan, goal: Goal, cases: Cases) ->
         search.reporter.say(f"{sample.sentence(goal)}: {more}")
         used = max(used + count, choosing)
     none = best is steps[0] and not enough
-    order = [] if none else [best, *now.removal(best, {})][::-1]
+    order = [] if none else now.order_of(best)
     return Found(steps, cases.numbers[:choosing], None if none else best, samples, order)
-
-
-def search_once(search: Search, current: Plan, goal: Goal) -> tuple[list[Step], Step]:
-    """All plans kept, and the best: all candidates, the scene's own plan, removal and exchange, and uniform
-    plans with as many fasteners as the best.
-    """
-    steps = [search.whole(search.candidates, "all candidates")]
-    if current != search.candidates:
-        steps.append(search.whole(current, "own"))
-    best, values = steps[0], Values()
-    if goal.count is None and best.gap_mm <= search.limit_mm:
-        best, way = search.fewest(best)
-        steps += way
-    elif goal.count is not None and comb(len(search.candidates), goal.count) <= PLANS:
-        steps.append(best := search.best_of_all(best, goal.count))
-    elif goal.count is not None:
-        steps += islice(search.removal(best, values), len(best.plan) - goal.count - 1)
-        steps.append(best := search.fewer(steps[-1], values, every=goal.count <= FEW)[0])
-    return [*steps, *search.wholes(search.even(len(best.plan)), "uniform")], best

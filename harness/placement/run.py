@@ -21,7 +21,7 @@ from harness.placement.candidates import MovableFasteners, Place, Plan
 from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.search_record import identity_of, record_of, sentence_on
-from harness.placement.session import THREADS, Study
+from harness.placement.session import THREADS, FastenerStudy
 from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
@@ -155,7 +155,7 @@ def place(
     def cases_of(scene: Scene) -> LoadCases:
         return Listed((load_case(scene, form),)) if single else cases.of(scene, form)
 
-    study = Study(movable.bare, movable.fastener, cases_of(movable.bare), form)
+    study = FastenerStudy(movable.bare, cases_of(movable.bare), form, movable.fastener)
     for sentence in (*study.bare.unusual, *study.cases.notes):
         reporter.say(sentence)
     share = share if share is not None else 1.0 if study.cases.count == 1 else 0.95
@@ -180,7 +180,8 @@ def place(
         pool = workers(scheduler, console) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
             journal = AnswerJournal(study, directory / PLANS, identity, executor)
-            search = Search(journal, study.bare, nodes, holes, 0, 0, goal.limit_mm or 0.0, reporter)
+            whole = journal, 0, 0, goal.limit_mm or 0.0
+            search = Search(*whole, study.bare, nodes, holes, reporter=reporter)
             result = search_in_rounds(search, movable.current, goal, order)
         from report.document.escape import csv_frame  # slow to import: not before the search
         from report.writers.place_report import write
@@ -216,7 +217,11 @@ def _scene_text(source: str, directory: Path, law: RandomGaps | None, plan: Plan
 
 
 def _written_scene(
-    path: Path, study: Study, law: RandomGaps | None, cases_of: Callable[[Scene], LoadCases], result: Found
+    path: Path,
+    study: FastenerStudy,
+    law: RandomGaps | None,
+    cases_of: Callable[[Scene], LoadCases],
+    result: Found,
 ) -> tuple[Scene, LoadCases]:
     """The scene of a file that was written, and its load cases: those that decided, too."""
     scene = read_scene(str(path))

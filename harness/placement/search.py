@@ -21,29 +21,23 @@ each of them if FEW fasteners or less are asked for. If there are at most PLANS 
 fasteners, all of them are compared instead.
 """
 
-import itertools
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
-from itertools import combinations
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice
 from math import comb, dist
 from typing import TypeAlias
 
 import numpy as np
 
 from harness.placement.candidates import Place, Plan, uniform_plans
-from harness.placement.session import Outcome, Question
+from harness.placement.plan_search import DIGITS, ESTIMATED, PlanSearch, Step
 from problems.forms.assembly import Matrix
 from problems.model.scene import JointScene
-from problems.reporter import SILENT, Reporter
-from report.document.numbers import counted
 
-Ask: TypeAlias = Callable[[Sequence[Question]], list[list[Outcome]]]
 Value: TypeAlias = tuple[float, float]
 Values: TypeAlias = dict[Place, Value]
 
-TOGETHER, ESTIMATED = 50, 14  # most cases in two questions, proven and estimated
-MORE_CASES = 8  # of an estimate, beyond twice those that may fail: with fewer, a plan's worst may be others
 AT_ONCE = 8  # plans estimated together
 NONE = (0.0, 0.0)  # less than any φ
 HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners that cost least
@@ -52,87 +46,35 @@ NEXT = 3  # a fastener and its neighbours
 FEW = 3  # up to so many fasteners, exchange starts from every plan
 PLANS = 300  # up to so many plans of a number, all are compared; after a removal half as many
 FURTHER = 1.25  # times the limit: removal goes on up to this gap
-DIGITS = 6  # of mm: values closer than a nanometre are equal, whatever the rounding
-
-
-@dataclass(frozen=True)
-class Step:
-    """A plan with its proven gap G, mm, and its outcome in each case. moved : how it came about."""
-
-    plan: Plan
-    gap_mm: float
-    outcome: Outcome
-    moved: str = ""
-
-    def order(self) -> tuple[float, Plan]:
-        """The least gap first."""
-        return round(self.gap_mm, DIGITS), self.plan
-
-    @property
-    def worst(self) -> int:
-        """The case with the largest gap."""
-        return max(range(len(self.outcome.largest)), key=lambda k: self.outcome.largest[k])
 
 
 @dataclass
-class Search:
+class Search(PlanSearch):
     """Searches among plans from a set of candidate holes.
 
-    ask : answers questions. bare : the scene without fasteners. contacts : their places (m, 2), mm. cases :
-    K, the number of load cases. allowed : how many of them may fail. reporter : is told each plan that is
-    kept.
+    bare : the scene without fasteners. contacts : their places (m, 2), mm.
     """
 
-    ask: Ask
+    item = "fastener"
     bare: JointScene
     contacts: Matrix
     candidates: Plan
-    cases: int
-    allowed: int
-    limit_mm: float
-    reporter: Reporter = SILENT
-    proven: Iterator[int] = field(default_factory=lambda: itertools.count(1))
 
-    def gap(self, outcome: Outcome) -> float:
-        """G, mm, in the cases of the outcome."""
-        return sorted(outcome.largest, reverse=True)[self.allowed]
-
-    def among(self, numbers: Sequence[int], allowed: int) -> "Search":
-        """The search among the load cases of these numbers, which are its cases 0, 1, …"""
-
-        def ask(questions: Sequence[Question]) -> list[list[Outcome]]:
-            return self.ask([replace(q, cases=tuple(numbers[k] for k in q.cases)) for q in questions])
-
-        return replace(self, ask=ask, cases=len(numbers), allowed=allowed)
-
-    def whole(self, plan: Plan, moved: str = "") -> Step:
-        """A plan solved in all cases, and proven."""
-        return self.wholes([plan], moved)[0]
-
-    def wholes(self, plans: Sequence[Plan], moved: str = "") -> list[Step]:
-        outcomes = self._outcomes(plans, range(self.cases), TOGETHER)
-        steps = [
-            Step(p, self.gap(outcome), outcome, moved) for p, outcome in zip(plans, outcomes, strict=True)
-        ]
-        for step in steps:
-            proven = counted(next(self.proven), "plan")
-            words = f"{counted(len(step.plan), 'fastener')}, {step.moved}: {step.gap_mm:.3g} mm"
-            self.reporter.progress(f"{words} ({proven} proven)")
-        return steps
-
-    def _outcomes(
-        self, plans: Sequence[Plan], cases: Sequence[int], most: int, base: Plan | None = None
-    ) -> list[Outcome]:
-        """The outcome of each plan. The cases are asked in an even number of parts, for two workers; most :
-        cases in two parts.
-        """
-        parts = [tuple(part.tolist()) for part in np.array_split(cases, 2 * -(-len(cases) // most))]
-        answers = self.ask([Question(tuple(plans), part, base) for part in parts if part])
-        names = [field.name for field in fields(Outcome)]
-        return [
-            Outcome(*(tuple(v for part in of_plan for v in getattr(part, name)) for name in names))
-            for of_plan in zip(*answers, strict=True)
-        ]
+    def once(self, current: Plan, count: int | None) -> tuple[list[Step], Step]:
+        """All candidates, the scene's own plan, removal and exchange, uniform plans of as many fasteners."""
+        steps = [self.whole(self.candidates, "all candidates")]
+        if current != self.candidates:
+            steps.append(self.whole(current, "own"))
+        best, values = steps[0], Values()
+        if count is None and best.gap_mm <= self.limit_mm:
+            best, way = self.fewest(best)
+            steps += way
+        elif count is not None and comb(len(self.candidates), count) <= PLANS:
+            steps.append(best := self.best_of_all(best, count))
+        elif count is not None:
+            steps += islice(self.removal(best, values), len(best.plan) - count - 1)
+            steps.append(best := self.fewer(steps[-1], values, every=count <= FEW)[0])
+        return [*steps, *self.wholes(self.even(len(best.plan)), "uniform")], best
 
     def even(self, count: int) -> list[Plan]:
         """Plans of the holes nearest to uniform patterns of `count` fasteners."""
@@ -225,7 +167,7 @@ class Search:
 
         If a move turns out not to lower G, its worst cases also decide about the next moves.
         """
-        cases = self._deciding(step)
+        cases = self.deciding(step)
         while step.gap_mm > self.limit_mm:
             moves = self._moves(step, earlier)
             (now, *values) = self._values(step, [step.plan, *moves], cases)
@@ -234,12 +176,15 @@ class Search:
                 break
             after = self.whole(moves[best], "exchange")
             if after.gap_mm < step.gap_mm:
-                step, cases = after, self._deciding(after)
-            elif set(more := self._deciding(after)) <= set(cases):
+                step, cases = after, self.deciding(after)
+            elif set(more := self.deciding(after)) <= set(cases):
                 break
             else:
                 cases = tuple(sorted({*cases, *more}))
         return step
+
+    def order_of(self, best: Step) -> list[Step]:
+        return [best, *self.removal(best, {})][::-1]
 
     def _moves(self, step: Step, earlier: Values) -> list[Plan]:
         """Plans with one fastener moved to a free hole."""
@@ -247,7 +192,7 @@ class Search:
         if not (free and step.plan):
             return []
         least = self._least(step, earlier, LEAST)
-        places = [self.contacts[step.outcome.contact[k]] for k in self._deciding(step)]
+        places = [self.contacts[step.outcome.contact[k]] for k in self.deciding(step)]
         holes = Counter(nearest(free, place, 1)[0] for place in places)
         moves = {
             plan: None
@@ -257,14 +202,9 @@ class Search:
         }
         return list(moves)
 
-    def _deciding(self, step: Step) -> tuple[int, ...]:
-        """The worst cases of a plan, by their numbers."""
-        worst = sorted(range(self.cases), key=lambda k: (-round(step.outcome.largest[k], DIGITS), k))
-        return tuple(sorted(worst[: 2 * self.allowed + MORE_CASES]))
-
     def _values(self, step: Step, plans: Sequence[Plan], cases: tuple[int, ...] = ()) -> list[Value]:
         """φ of other plans, estimated in `cases`, by default the worst ones of the step."""
-        outcomes = self._outcomes(plans, cases or self._deciding(step), ESTIMATED, step.plan)
+        outcomes = self.outcomes(plans, cases or self.deciding(step), ESTIMATED, step.plan)
         return [
             (
                 round(max(self.gap(outcome), self.limit_mm), DIGITS),

@@ -6,15 +6,15 @@ from typing import Any
 
 from harness.placement.candidates import Plan
 from harness.placement.fresh_cases import CONFIDENCE, Found, Goal
-from harness.placement.search import Step
-from harness.placement.session import Study
+from harness.placement.plan_search import Step
+from harness.placement.session import FastenerStudy
 from harness.results.provenance import installed_version, provenance
 from problems.forms.assembly import Matrix
 from problems.storage import digest
 from report.document.numbers import counted, position
 
 
-def identity_of(study: Study, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
+def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
     """All that decides what is written, so that one directory holds one search."""
     holes = {"candidates": candidates, "the scene's fasteners": current}
     return {
@@ -30,7 +30,7 @@ def identity_of(study: Study, current: Plan, candidates: Plan, goal: Goal) -> di
 
 
 def record_of(
-    study: Study, current: Plan, candidates: Plan, goal: Goal, result: Found, nodes: Matrix
+    study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal, result: Found, nodes: Matrix
 ) -> dict[str, Any]:
     """The content of place.json."""
 

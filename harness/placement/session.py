@@ -1,16 +1,18 @@
-"""The largest gap that plans of fasteners leave in each load case, computed in one process.
+"""The largest gap that plans leave in each load case, computed in one process.
 
-A fastener at z adds f_z to the forces f₀ of the scene without any, and u_z = AᵀK⁻¹f_z to its overlap p₀:
+A plan is a set of items, fasteners or shims. An item z adds f_z to the forces f₀ of the scene without any,
+g_z to its gaps, and u_z = AᵀK⁻¹f_z − g_z to its overlap p₀:
 
-    f = f₀ + Σ f_z,   p = p₀ + Σ u_z,
+    f = f₀ + Σ f_z,   g = g₀ + Σ g_z,   p = p₀ + Σ u_z,
 
 so that a plan costs no more than its contact problems. Active-set Newton solves each from the answer of
 another plan in the same load case: most contacts have the same state.
 """
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from uuid import uuid4
 
 import numpy as np
@@ -18,14 +20,15 @@ import threadpoolctl
 
 from harness.placement.candidates import Place, Plan
 from harness.solving.call_lock import in_turn
-from harness.verification.assess import GapError, assess
+from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms import Form
-from problems.forms.assembly import DualLoadCase, Matrix, Vector
+from problems.forms.assembly import DualLoadCase, Vector
 from problems.load_cases import LoadCases
+from problems.model.effect import Effect
 from problems.model.scene import JointScene
 from solvers.algorithms.newton_sweeps import Case, Sweeps
 
@@ -36,14 +39,31 @@ POWER = 8  # of the mean of gaps that stands for the largest one where that does
 
 
 @dataclass(frozen=True)
-class Study:
-    """The scene without fasteners, one of its fasteners, and its load cases."""
+class Study(ABC):
+    """The scene without the items of a plan, and its load cases."""
 
     bare: JointScene
-    fastener: Fasteners
     cases: LoadCases
     form: Form
-    key: str = field(default_factory=lambda: uuid4().hex)
+    key: str = field(default_factory=lambda: uuid4().hex, kw_only=True)
+
+    @abstractmethod
+    def effect(self, item: Place) -> Effect:
+        """What an item adds to the scene."""
+
+    def further(self, gap: Vector, x: Callable[[], Vector], error_mm: float) -> tuple[float, ...]:
+        """More figures of a case, from its gaps (m,) mm, no less than they can be, and x (n,) ± error_mm."""
+        return ()
+
+
+@dataclass(frozen=True)
+class FastenerStudy(Study):
+    """fastener : one of those that are left out of the scene."""
+
+    fastener: Fasteners
+
+    def effect(self, item: Place) -> Fasteners:
+        return self.fastener.model_copy(update={"points": (item,), "pattern": None})
 
 
 @dataclass(frozen=True)
@@ -62,12 +82,13 @@ class Outcome:
     """The gaps y of a plan, one entry per case.
 
     largest : the largest gap, mm; of a proven answer an upper bound on it. contact : where it is. mean :
-    (Σ y⁸ / m)^⅛, mm.
+    (Σ y⁸ / m)^⅛, mm. further : see `Study.further`.
     """
 
     largest: tuple[float, ...]
     contact: tuple[int, ...]
     mean: tuple[float, ...]
+    further: tuple[tuple[float, ...], ...] = ()
 
 
 class PlanSession:
@@ -80,7 +101,7 @@ class PlanSession:
         self.sweeps = Sweeps(self.data)
         self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
         self.loads: dict[int, DualLoadCase] = {}
-        self.columns: dict[Place, tuple[Vector, Vector]] = {}
+        self.columns: dict[Place, tuple[Vector, Vector, Vector]] = {}
         self.starts = lru_cache(4)(lambda base, k: self.sweeps.together(self._loads(base, k), ESTIMATE_MM))
 
     def answer(self, question: Question) -> list[Outcome]:
@@ -92,23 +113,28 @@ class PlanSession:
         """starts : one for each case of an estimate; none: it is proven."""
         if starts:
             cases = self.sweeps.together(loads, ESTIMATE_MM, starts)
-            gaps = np.column_stack([self.sweeps.vectors(case)[1] for case in cases])
-            error = np.zeros(len(loads))
+            lams, ys = zip(*map(self.sweeps.vectors, cases), strict=True)
+            xs = [partial(self.data.recover, *pair) for pair in zip(lams, loads, strict=True)]
+            gaps, errors, bounds = np.column_stack(ys), np.zeros(len(loads)), [0.0] * len(loads)
         else:
-            gaps, error = self._proven(loads, self.sweeps.together(loads, TOLERANCE_MM))
-        largest = gaps.max(axis=0)
+            answers, errors = self._proven(loads, self.sweeps.together(loads, TOLERANCE_MM))
+            xs = [partial(np.asarray, answer.x) for answer in answers]
+            gaps, bounds = np.column_stack([a.gap for a in answers]), [a.bound_mm for a in answers]
+        largest = gaps.max(axis=0) + errors
         mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
-        return Outcome(*(tuple(values.tolist()) for values in (largest + error, gaps.argmax(axis=0), mean)))
+        further = tuple(filter(None, map(self.study.further, (gaps + errors).T, xs, bounds)))
+        at = gaps.argmax(axis=0)
+        return Outcome(tuple(largest.tolist()), tuple(at.tolist()), tuple(mean.tolist()), further)
 
-    def _proven(self, loads: list[DualLoadCase], cases: list[Case]) -> tuple[Matrix, Vector]:
-        """Gaps (m, k), and how far the largest may be off (k,), mm."""
+    def _proven(self, loads: list[DualLoadCase], cases: list[Case]) -> tuple[list[Assessment], Vector]:
+        """The answers, and how far the largest gap of each may be off (k,), mm."""
         lams = [self.sweeps.vectors(case)[0] for case in cases]
         assessed = assess(self.proof, loads, lams, [None] * len(loads), ENOUGH_MM)
         errors = [
             self.gap_error(load.g, answer.x, answer.bound_mm).max(initial=0.0)
             for load, answer in zip(loads, assessed, strict=True)
         ]
-        return np.column_stack([answer.gap for answer in assessed]), np.array(errors)
+        return assessed, np.array(errors)
 
     def _loads(self, plan: Plan, numbers: Sequence[int]) -> list[DualLoadCase]:
         new = [k for k in numbers if k not in self.loads]
@@ -116,20 +142,18 @@ class PlanSession:
             made = self.data.with_p([self.study.cases.load(k) for k in new])
             self.loads |= dict(zip(new, made, strict=True))
         f = self.loads[numbers[0]].f.copy()
-        u = np.zeros(self.data.assembly.m)
-        for place in plan:
-            force, overlap = self.column(place)
-            f, u = f + force, u + overlap
-        return [DualLoadCase(f, self.loads[k].g, self.loads[k].p + u) for k in numbers]
+        g, u = np.zeros((2, self.data.assembly.m))
+        for item in plan:
+            force, gap, overlap = self.column(item)
+            f, g, u = f + force, g + gap, u + overlap
+        return [DualLoadCase(f, self.loads[k].g + g, self.loads[k].p + u) for k in numbers]
 
-    def column(self, place: Place) -> tuple[Vector, Vector]:
-        """f_z (n,) N and u_z (m,) mm."""
-        if place not in self.columns:
-            study, assembly = self.study, self.data.assembly
-            moved = study.fastener.model_copy(update={"points": (place,), "pattern": None})
-            f = load_case(study.bare, study.form, [moved]).f
-            self.columns[place] = f, assembly.A.T @ assembly.K.solve(f)
-        return self.columns[place]
+    def column(self, item: Place) -> tuple[Vector, Vector, Vector]:
+        """f_z (n,) N, g_z and u_z (m,) mm."""
+        if item not in self.columns:
+            load = load_case(self.study.bare, self.study.form, [self.study.effect(item)])
+            self.columns[item] = load.f, load.g, self.data.overlap(load) if load.f.any() else -load.g
+        return self.columns[item]
 
 
 _sessions: dict[str, PlanSession] = {}  # the only one of this process, so that it opens the assembly once

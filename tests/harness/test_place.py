@@ -20,9 +20,9 @@ from harness import solve
 from harness.placement import search as search_module
 from harness.placement.answer_journal import PLANS, AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, uniform_plans
-from harness.placement.fresh_cases import Cases, Goal, search_in_rounds, search_once
+from harness.placement.fresh_cases import Cases, Goal, search_in_rounds
 from harness.placement.search import Search
-from harness.placement.session import Outcome, PlanSession, Question, Study
+from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
@@ -46,10 +46,10 @@ class Told(Reporter):
         self.sentences.append(sentence)
 
 
-def study_of(path: Path, cases: int = 6) -> Study:
+def study_of(path: Path, cases: int = 6) -> FastenerStudy:
     movable = MovableFasteners.of(read_scene(str(path)))
     gaps = random_gaps(movable.bare, cases, 0)
-    return Study(movable.bare, movable.fastener, gaps, "dual")
+    return FastenerStudy(movable.bare, gaps, "dual", movable.fastener)
 
 
 def plans_of(path: Path, rows: int, columns: int) -> Plan:
@@ -107,7 +107,7 @@ def searched(session: PlanSession, limit: float, candidates: Plan, allowed: int 
     assert nodes is not None
     bare, count = session.study.bare, session.study.cases.count
     answers = lambda questions: [session.answer(q) for q in questions]  # noqa: E731
-    return Search(answers, bare, nodes, candidates, count, allowed, limit)
+    return Search(answers, count, allowed, limit, bare, nodes, candidates)
 
 
 @pytest.fixture
@@ -190,7 +190,7 @@ def told(strip: Path, candidates: Plan, gap_of: Any, cases: int = 1) -> Search:
 
     bare = study_of(strip).bare
     return Search(
-        lambda some: list(map(outcomes, some)), bare, np.array(candidates), candidates, cases, 0, 0.0
+        lambda some: list(map(outcomes, some)), cases, 0, 0.0, bare, np.array(candidates), candidates
     )
 
 
@@ -300,7 +300,7 @@ def test_few_plans_are_all_compared(strip: Path, count: int) -> None:
     candidates, gaps = plans_of(strip, 2, 4), np.random.default_rng(count)
     plans = {plan: gaps.uniform(size=20) for k in range(9) for plan in combinations(candidates, k)}
     search = told(strip, candidates, lambda plan, case: float(plans[plan][case]), cases=20)
-    _, best = search_once(replace(search, allowed=1), candidates, Goal(None, 0.95, count))
+    _, best = replace(search, allowed=1).once(candidates, count)
     assert best.gap_mm == min(sorted(gap)[-2] for plan, gap in plans.items() if len(plan) == count)
 
 
@@ -545,6 +545,6 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
     movable = MovableFasteners.of(read_scene(str(path)))
-    study = Study(movable.bare, movable.fastener, Listed((load_case(movable.bare),)), "dual")
+    study = FastenerStudy(movable.bare, Listed((load_case(movable.bare),)), "dual", movable.fastener)
     (found,) = PlanSession(study).answer(Question((movable.current,), (0,)))
     assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)
