@@ -71,8 +71,10 @@ def with_x(
 ) -> list[Answer]:
     """The answers, in the sparse form with x = K⁻¹(f − Aλ) refined by δ, and the status of this x.
 
-    "solved" if the KKT residual of y = g − Aᵀx is at most
-    max(tolerance, min(4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|), ROUNDING_MM)).
+    "solved" if the KKT residual of y = g − Aᵀx is at most max(tolerance, min(ρ, ROUNDING_MM)), ρ the part due
+    to rounding: of g and x, of x as δ shows it, and of the forces, by e = ε|K⁻¹(|f| + |A|λ)|,
+
+        ρ = 4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|) + 4 max(|A|ᵀe).
     """
     with_lam = [k for k, answer in enumerate(answers) if answer.lam is not None]
     refined = list(answers)
@@ -87,6 +89,9 @@ def with_x(
     y, size = cases.g - assembly.A.T @ x, abs(assembly.A).T
     rounding = 4 * (EPS * (abs(cases.g) + size @ abs(x)) + size @ abs(delta)).max(axis=0)
     missed = np.where(lam > 0, abs(y), -y).max(axis=0, initial=0.0)
+    if (missed > np.maximum(tolerance, rounding)).any():
+        moved = assembly.K.solve(abs(cases.f) + abs(assembly.A) @ abs(lam))
+        rounding = rounding + 4 * EPS * (size @ abs(moved)).max(axis=0)
     for column, k in enumerate(with_lam):
         status, residual = refined[k].status, float(missed[column])
         if status in ("solved", "inaccurate"):

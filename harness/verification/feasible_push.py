@@ -25,7 +25,6 @@ from .enclosure import ETA, SAFE
 from .sprung_contacts import Springs
 
 NEARLY_CLOSED = 2.0**20  # times the largest overlap: a larger gap stays open
-STIFF = 2.0**40  # springs of a step, in units of κ, at most: a few digits of K are kept
 LONGEST, ENOUGH = 5.0, 0.1  # of a_jᵀp in a step, and at the end
 MAX_STEPS = 30
 
@@ -39,15 +38,15 @@ class Push:
     energy: float
 
     @classmethod
-    def of(cls, units: Balanced, springs: Springs, kappa: float, closed: Mask) -> "Push":
-        """The push that opens the contacts `closed` (m,). kappa : κ ≤ λmin(K)."""
+    def of(cls, units: Balanced, springs: Springs, closed: Mask) -> "Push":
+        """The push that opens the contacts `closed` (m,)."""
         sprung, A = springs.sprung, springs.sprung.A
         p, opening = np.zeros(A.shape[0]), np.zeros(A.shape[1])
         for _ in range(MAX_STEPS):
             least = float(opening[closed].min(initial=np.inf))
             if least >= ENOUGH:
                 break
-            forces = np.where(closed, STIFF * kappa * np.exp(np.minimum(least - opening, 0.0)), 0.0)
+            forces = np.where(closed, springs.rho * np.exp(np.minimum(least - opening, 0.0)), 0.0)
             step = sprung.block(forces).solve(A @ forces)
             change = A.T @ step
             share = LONGEST / max(float(abs(change).max()), LONGEST)

@@ -50,6 +50,7 @@ MAX_PASSES = 30
 MAX_WORSE = 2  # passes in a row that do not halve the bound
 MAX_PRODUCTS = 60  # of conjugate gradients in a pass
 REDUCTION = 1e-6  # of y_C in a pass
+FLAT = 2.0**-20  # of 1/ρ: a curvature of dependent contacts
 AT_ROUNDING = 1.5  # of what roundings alone give: a bound that no further pass halves
 
 
@@ -230,7 +231,7 @@ class Proof:
     def _pushed(self, s: Vector, error: Vector, uncertain: Vector, lam: Vector) -> tuple[float, float]:
         """‖x − x*‖_K or less, and its part that is due to the errors of s; all (m,)."""
         assert self.springs is not None
-        push = Push.of(self.balanced, self.springs, self.kappa, nearly_closed(s, error, lam))
+        push = Push.of(self.balanced, self.springs, nearly_closed(s, error, lam))
         return push.distance(s, error, lam), push.distance(np.where(uncertain > 0, 0, s), uncertain, lam)
 
     def _translated(self, s: Enclosure, pressing: Mask) -> tuple[Enclosure, Matrix]:
@@ -293,6 +294,7 @@ class Proof:
         missed = np.where(C, At @ dx - y, 0.0)
         target = np.maximum(target, REDUCTION * length(closing))
         direction, previous = np.zeros_like(missed), np.ones(missed.shape[1])
+        flat = FLAT / rho if rho else 0.0
         for _ in range(MAX_PRODUCTS):
             going = length(missed) > target
             if not going.any():
@@ -303,10 +305,13 @@ class Proof:
             w = solve(A @ direction)
             q = np.where(C, At @ w, 0.0)
             energy = (direction * q).sum(axis=0)
-            step = np.where(going & (energy > 0), product / energy, 0.0)
+            bent = going & (energy > flat * (direction**2).sum(axis=0))
+            if not bent.any():
+                break
+            step = np.where(bent, product / energy, 0.0)
             dlam, dx, missed = dlam + step * direction, dx - step * w, missed - step * q
             previous = np.where(product > 0, product, 1.0)
-        return dx, dlam
+        return dx, dlam + rho * missed
 
 
 def cached_figure(prepared: Prepared, name: str, make: Callable[[], float]) -> float:

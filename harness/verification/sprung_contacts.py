@@ -7,8 +7,9 @@ Lagrangian; Hestenes, J. Optim. Theory Appl. 4:303–320, 1969):
 
 The matrix of dλ_C becomes A_Cᵀ(K + ρA_C A_Cᵀ)⁻¹A_C = Q_CC (I + ρQ_CC)⁻¹, with eigenvalues q/(1 + ρq): the
 more of those of Q_CC are above 1/ρ, the fewer steps conjugate gradients take. The first step from dλ_C = 0,
-dλ_C = −ρ (s_C − A_Cᵀdx), tells the signs of a set. In balanced units ρ = max(1, 2²⁶κ): no softer than an
-unknown, and half of the digits of K are kept.
+dλ_C = −ρ (s_C − A_Cᵀdx), tells the signs of a set, and such a step at the end leaves in r the rounding of a
+solution alone. In balanced units ρ = max(1, 2⁴⁰κ): no softer than an unknown, and the last twelve bits of K
+are kept.
 """
 
 import numpy as np
@@ -20,7 +21,7 @@ from problems.stiffness.block import scaled
 
 from .balanced_units import Balanced
 
-KEPT = 2.0**26
+KEPT = 2.0**40
 MAX_SETS = 10  # contact sets tried for one load case
 
 

@@ -121,16 +121,17 @@ class ContactSprings:
         closed = At @ K.solve(A @ np.where(C, rho * y, lam))
         step = r = np.where(C, closed - y, 0.0)
         size, enough = float(r @ r), ENOUGH**2 * float(y[C] @ y[C])
-        for _ in range(STEPS if size else 0):
+        for _ in range(STEPS):
+            if size <= enough:
+                break
             given = At @ K.solve(A @ step)
             alpha = size / float(step @ given)
             change, closed = change + alpha * step, closed - alpha * given
             r, last = np.where(C, closed - y, 0.0), size
             size = float(r @ r)
-            if size <= enough:
-                break
             step = r + size / last * step
-        return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
+        lam = lam + change + rho * r
+        return TrialSolution(lam, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
 
     def first_set(self, load: DualLoadCase) -> Mask:
         """The contacts that overlap with springs as stiff as K, (m,), found from λ = 0 like `yielding_set`.

@@ -13,16 +13,18 @@ from small_problems import make_load, make_prepared, make_strips, problem_in, so
 from sparse_matrices import band_matrix, graph_matrix
 
 from harness.solving.session import SolverSession
-from harness.verification.reference import best_of_candidates, reference
+from harness.verification.reference import best_of_candidates, proof_of, reference
 from harness.verification.reference_problem import last_stage
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
+from problems.ladders.sparse import convex
 from problems.scene_files import read_scene, scene_names
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse_block import GeneralBlock
 from solvers.base import Answer
+from solvers.kkt import with_x
 from solvers.registry import make_solver
 
 LIMIT_MM = 1e-7 / 4
@@ -108,6 +110,24 @@ def test_an_edge_of_contact_does_not_creep(dense: bool, n: int, most: int) -> No
     assert lam.min() >= 0
     assert abs(lam @ (A.T @ x)) <= 1e-6
     assert abs(x + A @ lam - f).max() <= 1e-6
+
+
+def test_forces_whose_rounding_is_above_the_tolerance() -> None:
+    """Convex regression of 10 000 unknowns: an ulp of λ moves gaps by 1e-10 mm. That is solved, and proven;
+    forces off by a relative 1e-13 are not."""
+    made = convex(10_000, 0.3, 1).made
+    assert made is not None
+    data, load = Prepared(made.assembly), made.load
+    answer = session_of("newton", data).next(load, None)
+    lam = np.asarray(answer.lam)
+    assert answer.status == "solved"
+    assert lam.max() > 1e5
+    assert answer.details["kkt_residual_mm"] > 1e-10
+    (proven,) = proof_of(data).proven([load], [lam])
+    assert abs(answer.x - proven.x.hi).max() <= 1e-8
+    assert proven.bound_mm <= 1e-14
+    off = replace(answer, lam=lam * (1 + 1e-13 * np.random.default_rng(0).standard_normal(len(lam))))
+    assert with_x(problem_in(data, "sparse"), [off], [load], 1e-10)[0].status == "inaccurate"
 
 
 @pytest.mark.parametrize("with_nodes", [False, True])
