@@ -38,7 +38,7 @@ from .errors import BACKSLASH, Fault, InputError
 FOLDER = Path(__file__).resolve().parent
 SCENES = FOLDER / "scenes"
 ASSEMBLIES = FOLDER / "assemblies"
-KEYS = ("title", "assembly", "joint", "effect", "stage", "output", "matrices")
+KEYS = ("title", "assembly", "joint", "effect", "stage", "output", "random", "matrices")
 TOML_MIB = 10
 #: The motions that are left to a plate, by the number of those that its supports hold.
 LOOSE = ("it moves and tilts freely", "it tilts about a point", "it tilts about a line")
@@ -142,6 +142,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     tables = _effect_tables(joint_path, joint_data, faults) if joint_path != path else []
     tables += _effect_tables(path, data, faults)
     stages, output = _stages(path, data, faults), _output(path, data, faults)
+    random = tuple(_random(path, "", data.pop("random", {}), faults))
     faults += [Fault(str(path), key, value, unknown("key", key, KEYS)) for key, value in data.items()]
 
     for table in tables:
@@ -156,7 +157,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
             faults += _of_stages(path, joint_path, joint, effects, stages)
     if faults or joint is None:
         raise InputError(faults)
-    return JointScene(name, title, joint, effects, stages, output)
+    return JointScene(name, title, joint, effects, stages, output, random)
 
 
 def _output(path: Path, data: dict[str, Any], faults: list[Fault]) -> Output:
@@ -166,6 +167,24 @@ def _output(path: Path, data: dict[str, Any], faults: list[Fault]) -> Output:
     except ValidationError as error:
         faults += validation_faults(path, Output, error, "output")
         return Output()
+
+
+def _random(path: Path, name: str, value: object, faults: list[Fault]) -> Iterator[str]:
+    """Yield KEY=DISTRIBUTION of each entry of [random], also in tables within it; `series` reads them."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _random(path, f"{name}.{key}".lstrip("."), inner, faults)
+    elif name and isinstance(value, str):
+        yield f"{name}={value}"
+    else:
+        faults.append(
+            Fault(
+                str(path),
+                f"random.{name}".rstrip("."),
+                value,
+                'as in fasteners.preload = "normal(1000, 100)"',
+            )
+        )
 
 
 def _stages(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Stage, ...]:

@@ -68,6 +68,10 @@ Gaps = Annotated[
     Path | None,
     option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
 ]
+Random = Annotated[
+    list[str] | None,
+    option("KEY=LAW", "A random key of the scene, as fasteners.preload='normal(1000, 100)'. Repeatable."),
+]
 Columns = Annotated[
     str | None,
     option("HEADINGS", "Headings of x, y and gap in FILE, as 'Pos X,Pos Y,Gap'.  [default: x,y,gap]"),

@@ -18,6 +18,7 @@ from .options import (
     MemoryLimit,
     Missing,
     Plugin,
+    Random,
     SceneName,
     Scheduler,
     Seed,
@@ -38,6 +39,7 @@ def series(
     correlation_length: Length = None,
     around: Around = None,
     gaps: Gaps = None,
+    random: Random = None,
     columns: Columns = None,
     missing: Missing = None,
     sweep: Annotated[
@@ -69,7 +71,7 @@ def series(
     scheduler: Scheduler = None,
     allow_gap: AllowGap = None,
 ) -> None:
-    """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
+    """Solve many load cases on one assembly: random gaps and keys, measured gaps, or a sweep.
 
     The assembly is opened and the solver prepared once. Each case is a row with a proven bound on its error,
     and its gaps are saved: stop with Ctrl-C, run the same command again, and it continues where it stopped;
@@ -81,6 +83,8 @@ def series(
       python -m harness series 4386/0107 --sd 0.2 --correlation-length 150 --cases 200 --out results/var
       python -m harness series 4386/0107 --around scan.csv --sd 0.2 --correlation-length 150 \\
                                          --allow-gap 0.05 --out results/scanned
+      python -m harness series 4386/1074 --random 'fasteners.preload=each normal(1000, 100)' \\
+                                         --random 'pressure.0.value=uniform(2e-4, 1e-4)' --out results/random
       python -m harness series 4386/1074 --gaps measured.csv --out results/measured
       python -m harness series 4386/1074 --gaps measured.csv --allow-gap 0.05 --out results/measured
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
@@ -104,7 +108,7 @@ def series(
         outcome = run_series(
             scene,
             out,
-            GapCases(cases, seed, mean, sd, correlation_length, around, gaps, read_by),
+            GapCases(cases, seed, mean, sd, correlation_length, around, gaps, read_by, tuple(random or ())),
             SeriesOptions(solver, form, *accuracy, threads, plugin, *limits),
             sweep=sweep or (),
             allow_gap_mm=allow_gap,

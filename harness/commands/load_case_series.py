@@ -1,7 +1,7 @@
 """Solves many load cases on one assembly into a directory, which keeps rows, gaps, report and verdict."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -113,6 +113,11 @@ def run_series(
     """
     source, directory, solver = str(scene), Path(out), options.solver
     refuse_unusable(allow_gap_mm)
+    read = read_scene(source)
+    if isinstance(read, JointScene) and not (sweep or cases.gaps):
+        told = {text.partition("=")[0] for text in cases.random}
+        in_scene = [text for text in read.random if text.partition("=")[0] not in told]
+        cases = replace(cases, random=(*in_scene, *cases.random))
     faults = cases.faults(sweep)
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
@@ -127,12 +132,11 @@ def run_series(
     inputs = [Path(file) for file in (source, cases.around, cases.gaps, options.plugin) if file]
     refuse_unwritable(directory, inputs)
     refuse_inputs([directory / SERIES], inputs)
-    read = read_scene(source)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
     wanted = options.form or (earlier if earlier in made.forms else None)
     if isinstance(read, JointScene) and read.stages:
-        _refuse_with_stages(read, sweep, options.plugin)
-    count = swept(read, sweep).count if sweep else cases.count or RANDOM
+        _refuse_with_stages(read, (*sweep, *cases.random), options.plugin)
+    count = swept(read, sweep).count if sweep else cases.count or RANDOM * (cases.contributors or 1)
     choice = chosen_form(read, made.forms, wanted, count)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
@@ -155,9 +159,10 @@ def run_series(
     return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], report)
 
 
-def _refuse_with_stages(scene: JointScene, sweep: Sequence[str], plugin: Path | None) -> None:
+def _refuse_with_stages(scene: JointScene, keys: Sequence[str], plugin: Path | None) -> None:
     """Raise InputError for what does not go through stages."""
-    faults = [Fault("--sweep", "sweep", one, f"left out: {scene.name} has stages") for one in sweep]
+    where = "--sweep, --random"
+    faults = [Fault(where, "key", one, f"left out: {scene.name} has stages") for one in keys]
     if plugin:
         faults.append(Fault("--plugin", "plugin", str(plugin), f"left out: {scene.name} has stages"))
     if faults:

@@ -121,7 +121,9 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
     within, cases = answered - exceed - result.undecided, counted(answered, "case")
     sure = f"Surely within {allowed_mm:g} mm: {within} of {cases}"
     if answered and not series.swept:  # steps are no sample
-        low, high = binomtest(within, answered).proportion_ci(CONFIDENCE, "exact")
+        free = exceeding(series.independent, allowed_mm)
+        kept = free.answered - len(free.cases) - free.undecided
+        low, high = binomtest(kept, free.answered).proportion_ci(CONFIDENCE, "exact")
         sure += f"; the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
     kind, said = "" if result.undecided or not answered else "pass", [f"{sure}."]
     if result.undecided:

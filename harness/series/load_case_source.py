@@ -5,13 +5,15 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault
 from problems.forms import Form
 from problems.input.tables import AS_NAMED, TableOptions
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
-from problems.model.scene import Scene
+from problems.load_cases.random_inputs import random_inputs
+from problems.model.scene import JointScene, Scene
 
 RANDOM = 100  # cases, if no number is given
 
@@ -33,6 +35,10 @@ class GapCases:
     gaps : Path, optional
         Measured gaps in place of random ones: .csv, .npz or .npy, one row per case, one column per contact,
         mm.
+    random : tuple of str, optional
+        KEY=DISTRIBUTION, keys of the scene that are random, as "fasteners.preload=each normal(1000, 100)".
+    contributors : int, optional
+        Number N of base points, a power of 2: the cases are the N (d + 2) that show what d inputs contribute.
     options : TableOptions, optional
         Headings of the scan's columns x, y and gap, and marks of missing gaps.
 
@@ -51,6 +57,8 @@ class GapCases:
     around: Path | None = None
     gaps: Path | None = None
     options: TableOptions = AS_NAMED
+    random: tuple[str, ...] = ()
+    contributors: int | None = None
 
     def faults(self, sweep: Sequence[str] = (), table: str | None = None) -> list[Fault]:
         """A fault if the cases come from more than one source, or no table has headings. table : another that
@@ -58,10 +66,14 @@ class GapCases:
         """
         names = ("seed", "mean", "sd", "correlation_length", "around")
         random = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
+        random += ["--random"] * bool(self.random)
         sources, faults = (["--gaps"] * bool(self.gaps), ["--sweep"] * bool(sweep), random), []
         if self.options.columns and not (self.around or table):
             allowed = "those of --around; the columns of --gaps are the contacts, in their order"
             faults.append(Fault("--columns", "headings", ", ".join(self.options.columns), allowed))
+        if self.contributors is not None and (self.count is not None or not self.random):
+            allowed = "--random, or [random] in the scene, and no --cases: there are N (inputs + 2)"
+            faults.append(Fault("--contributors", "base points", self.contributors, allowed))
         if sum(map(bool, sources)) > 1:
             allowed = "random gaps, --gaps or --sweep" if sweep else "random gaps or --gaps"
             faults.append(Fault("cases", "given", " ".join(chain(*sources)), allowed))
@@ -71,8 +83,15 @@ class GapCases:
         """The load cases of a scene. Raises InputError, as `measured_gaps` and `random_gaps` do."""
         if self.gaps:
             return measured_gaps(scene, self.gaps, self.count, form, self.options)
-        law = self.mean, self.sd, self.correlation_length
-        return random_gaps(scene, self.count or RANDOM, self.seed or 0, *law, form, self.around, self.options)
+        law, count = (self.mean, self.sd, self.correlation_length), (self.count or RANDOM, self.seed or 0)
+        fields = scene.effects_of(InitialGap) if isinstance(scene, JointScene) else ()
+        drawn = law != (None, None, None) or self.around or any(field.random for field in fields)
+        if self.random and not drawn:
+            return random_inputs(scene, self.random, *count, form, None, self.contributors)
+        gaps = random_gaps(scene, *count, *law, form, self.around, self.options)
+        if not self.random:
+            return gaps
+        return random_inputs(scene, self.random, *count, form, gaps, self.contributors)
 
 
 DEFAULT = GapCases()

@@ -100,6 +100,7 @@ def metadata(job: Job) -> dict[str, Any]:
         "title": job.scene.title,
         "cases": job.cases.count,
         "kind": type(job.cases).__name__,
+        **job.cases.facts,
         "n": size[0] if size else None,
         "threads": job.threads,
         "check": job.check,

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from problems.forms.assembly import LoadCase
 from problems.storage import digest
@@ -15,6 +16,7 @@ class LoadCases(ABC):
     #: Sentences on the input that its user reads before a verdict.
     notes: tuple[str, ...] = ()
     first: int = 0  # the number of the first case
+    facts: ClassVar[dict[str, Any]] = {}  # of all cases, for a report
 
     @property
     @abstractmethod

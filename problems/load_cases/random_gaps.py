@@ -12,7 +12,7 @@ from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
 from problems.forms import Form
-from problems.forms.assembly import LoadCase, Matrix
+from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import validation_faults
 from problems.input.tables import AS_NAMED, TableOptions
 from problems.model.interface import AnyJoint
@@ -54,15 +54,18 @@ class RandomGaps(LoadCases):
         return {"gap_seed": int(state) >> (64 - SEED_BITS)}
 
     def load(self, k: int) -> LoadCase:
-        assert self.field.random is not None
-        seed, sd = self.parameters(k)["gap_seed"], self.field.random.sd
-        field = self.field.model_copy(update={"random": self.field.random.model_copy(update={"seed": seed})})
+        return LoadCase(self.rest.f, self.rest.g + self.gap(k, self.field))
+
+    def gap(self, k: int, law: InitialGap) -> Vector:
+        """The gap of case k, (m,) mm, with this law of the field."""
+        assert law.random is not None
+        seed, sd = self.parameters(k)["gap_seed"], law.random.sd
+        field = law.model_copy(update={"random": law.random.model_copy(update={"seed": seed})})
         if self.scan is None:
-            return LoadCase(self.rest.f, self.rest.g + field.gap(self.joint))
+            return field.gap(self.joint)
         scan, random = self.scan, np.random.default_rng((seed, 1))
         through = {pair: scan.through(z, sd, random) for pair, z in field.on_grid(self.joint).items()}
-        gap = at_contacts(lambda pair: self.joint.from_grid(pair, through[pair]), list(through), self.joint)
-        return LoadCase(self.rest.f, self.rest.g + gap)
+        return at_contacts(lambda pair: self.joint.from_grid(pair, through[pair]), list(through), self.joint)
 
     @cached_property
     def scan(self) -> Scan | None:

@@ -15,6 +15,8 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase
 from problems.input.bounded_types import validation_faults
 from problems.model.effect import SpringEffect, StiffnessEffect
+from problems.model.interface import AnyJoint
+from problems.model.positions import Positions
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
@@ -26,37 +28,61 @@ NOTHING, OTHER = "the scene has no force or gap to sweep", "what changes K would
 
 
 @dataclass(frozen=True)
-class Step:
-    """One --sweep: the key as written, the index of the effect and the keys in it, and the values."""
+class Key:
+    """A number that changes f or g: its name, the index of its effect, and the keys that lead to it.
+
+    `points.x` and `points.y` are a shift of all points of an effect, mm; any other key is replaced.
+    """
 
     name: str
     effect: int
-    keys: tuple[str, ...]
-    values: tuple[float, ...]
+    path: tuple[str, ...]
+
+    def changed(self, effect: Any, value: float, joint: AnyJoint) -> Any:
+        """The effect with this number changed, validated as on reading."""
+        table = inner = effect.model_dump()
+        if self.path[0] == "points":
+            shift = [value * (self.path[1] == axis) for axis in "xy"]
+            table |= {"points": (effect.marks(joint) + shift).tolist(), "pattern": None}
+            return type(effect).model_validate(table)
+        for key in self.path[:-1]:
+            inner = inner[key]
+        inner[self.path[-1]] = value
+        return type(effect).model_validate(table)
+
+    def faults(self, scene: JointScene, value: float, where: str) -> list[Fault]:
+        """The faults of this value."""
+        effect = scene.effects[self.effect]
+        try:
+            return [
+                Fault(where, *fault) for fault in self.changed(effect, value, scene.joint).faults(scene.joint)
+            ]
+        except ValidationError as error:
+            return list(validation_faults(where, type(effect), error, effect_name(scene, self.effect)))
 
 
 @dataclass(frozen=True)
 class Sweep(LoadCases):
-    """All combinations of the steps' values, the last step varying fastest."""
+    """All combinations of the values of each key, those of the last one varying fastest."""
 
     scene: JointScene
-    steps: tuple[Step, ...]
+    steps: dict[Key, tuple[float, ...]]
     count: int
     form: Form = "dual"
     notes: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
-        return digest([[step.name, step.values] for step in self.steps])
+        return digest([[key.name, values] for key, values in self.steps.items()])
 
     def parameters(self, k: int) -> dict[str, Any]:
-        places = np.unravel_index(k, [len(step.values) for step in self.steps])
-        return {step.name: step.values[i] for step, i in zip(self.steps, places, strict=True)}
+        places = np.unravel_index(k, [len(values) for values in self.steps.values()])
+        return {key.name: values[i] for (key, values), i in zip(self.steps.items(), places, strict=True)}
 
     def load(self, k: int) -> LoadCase:
         effects = list(self.scene.effects)
-        for step, value in zip(self.steps, self.parameters(k).values(), strict=True):
-            effects[step.effect] = _changed(effects[step.effect], step, value)
+        for key, value in zip(self.steps, self.parameters(k).values(), strict=True):
+            effects[key.effect] = key.changed(effects[key.effect], value, self.scene.joint)
         return load_case(replace(self.scene, effects=tuple(effects)), self.form)
 
 
@@ -65,22 +91,16 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
     if not isinstance(scene, JointScene):
         raise InputError.one("--sweep", "key", ", ".join(texts), f"{NOTHING}; {OTHER}")
     faults: list[Fault] = []
-    steps = tuple(step for text in texts if (step := _step(scene, text, faults)))
-    for step in steps:
-        for value in step.values:
-            try:
-                effect = _changed(scene.effects[step.effect], step, value)
-            except ValidationError as error:
-                effect, name = scene.effects[step.effect], effect_name(scene, step.effect)
-                faults += validation_faults(f"--sweep {step.name}", type(effect), error, name)
-                continue
-            faults += [Fault(f"--sweep {step.name}", *fault) for fault in effect.faults(scene.joint)]
-    names = [step.name for step in steps]
+    found = [step for text in texts if (step := _step(scene, text, faults))]
+    names, steps = [key.name for key, _ in found], dict(found)
+    for key, values in found:
+        for value in values:
+            faults += key.faults(scene, value, f"--sweep {key.name}")
     twice = {name for name in names if names.count(name) > 1}
     faults += [Fault("--sweep", name, names, "is swept twice") for name in twice]
     if faults:
         raise InputError(faults)
-    count = prod(len(step.values) for step in steps)
+    count = prod(map(len, steps.values()))
     if count > MOST_CASES:
         raise InputError.one("--sweep", "cases", count, f"at most {MOST_CASES} combinations")
     whole = [text.partition("=") for text in texts if re.fullmatch(r"[^=]+=-?\d+,\d+", text)]
@@ -95,23 +115,37 @@ def effect_name(scene: JointScene, index: int) -> str:
     return kind if len(alike) == 1 else f"{kind}.{alike.index(index)}"
 
 
-def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
+def _step(scene: JointScene, text: str, faults: list[Fault]) -> tuple[Key, tuple[float, ...]] | None:
     name, equals, values = text.partition("=")
     numbers = _values(values)
     if not equals or not 0 < len(numbers) <= MOST:
         allowed = f"at most {MOST} values" if len(numbers) > MOST else SYNTAX
         faults.append(Fault("--sweep", "sweep", text, allowed))
         return None
-    keys = {
-        f"{effect_name(scene, i)}.{'.'.join(path)}": Step(name, i, path, numbers)
-        for i, effect in enumerate(scene.effects)
-        if not isinstance(effect, StiffnessEffect | SpringEffect)  # on which K depends
-        for path in _numbers(effect.model_dump())
-    }
+    keys = keys_of(scene)
     if name not in keys:
-        allowed = f"one of {', '.join(keys)}" if keys else NOTHING
-        faults.append(Fault("--sweep", "key", name, f"{allowed}; {OTHER}"))
-    return keys.get(name)
+        faults.append(Fault("--sweep", "key", name, allowed_keys(keys)))
+        return None
+    return keys[name], numbers
+
+
+def keys_of(scene: JointScene) -> dict[str, Key]:
+    """The numbers of a scene that change f or g, and not K, by their names."""
+    keys: dict[str, Key] = {}
+    for i, effect in enumerate(scene.effects):
+        paths = [] if isinstance(effect, StiffnessEffect) else _numbers(effect.model_dump())
+        if isinstance(effect, SpringEffect):  # the others change K
+            paths = [path for path in paths if path[0] in SpringEffect.model_fields]
+        elif isinstance(effect, Positions):
+            paths += [("points", "x"), ("points", "y")]
+        names = [".".join((effect_name(scene, i), *path)) for path in paths]
+        keys |= {name: Key(name, i, path) for name, path in zip(names, paths, strict=True)}
+    return keys
+
+
+def allowed_keys(keys: dict[str, Key]) -> str:
+    """The names of these keys, for messages."""
+    return (f"one of {', '.join(keys)}" if keys else NOTHING) + f"; {OTHER}"
 
 
 def _numbers(table: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -136,12 +170,3 @@ def _values(text: str) -> tuple[float, ...]:
     except ValueError:
         return ()
     return tuple(values) if np.isfinite(values).all() else ()
-
-
-def _changed(effect: Any, step: Step, value: float) -> Any:
-    """The effect with one number changed, validated as on reading."""
-    table = inner = effect.model_dump()
-    for key in step.keys[:-1]:
-        inner = inner[key]
-    inner[step.keys[-1]] = value
-    return type(effect).model_validate(table)

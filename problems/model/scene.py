@@ -91,7 +91,8 @@ class Output(Table):
 class JointScene(Scene):
     """A joint and the effects that the scene includes.
 
-    stages : by default all effects act at once; see `stage_answers.through`. output : in no key.
+    stages : by default all effects act at once; see `stage_answers.through`. output, random : in no key.
+    random : the table [random], each entry as KEY=DISTRIBUTION; `series` draws them.
     model : see `problems.build.model_of`; neither copied nor sent to a worker.
     """
 
@@ -99,6 +100,7 @@ class JointScene(Scene):
     effects: tuple[Effect, ...] = ()
     stages: tuple[Stage, ...] = ()
     output: Output = field(default_factory=Output)
+    random: tuple[str, ...] = ()
     model: Any = field(default=None, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ the gaps to float32, 6e-8 of their size.
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,12 @@ class Series:
         """The fasteners for a map of the junction."""
         return {"fasteners": self.fasteners.tolist()} if len(self.fasteners) else {}
 
+    @property
+    def independent(self) -> "Series":
+        """The independent cases alone: of those for contributors, two of each base point."""
+        per_point = self.facts.get("cases_per_point", 1)
+        return replace(self, cases=self.cases[self.cases["case"] % per_point < 2]) if per_point > 1 else self
+
     def of_contacts(self, step: int = 1) -> Iterator[Array]:
         """The gaps of every step-th contact in pieces: (cases, some contacts), mm."""
         numbers = self.cases["case"].to_numpy()
@@ -80,7 +86,7 @@ def read(directory: Path) -> Series:
         verdicts[case], rows[case] = row["verdict"], None
         code[case] = row.get("commit") or "", row.get("clean")
         if row.get("max_gap_mm") is not None:
-            swept = swept or [key for key in row if "." in key]
+            swept = swept or [key for key in row if "." in key and not facts.get("inputs")]
             rows[case] = (case, *(row.get(name) for name in FIGURES), *(row[key] for key in swept))
     kept = [row for row in rows.values() if row]
     swept = quoted(swept)
@@ -120,7 +126,7 @@ def convergence(series: Series) -> pd.DataFrame:
     """
     from scipy.stats import binom
 
-    largest = series.cases["max_gap_mm"].to_numpy()
+    largest = series.independent.cases["max_gap_mm"].to_numpy()
     counts = np.unique(np.geomspace(min(10, len(largest)), len(largest), 25).astype(int))
     lines = []
     for count in counts:

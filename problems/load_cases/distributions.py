@@ -1,0 +1,42 @@
+"""Reads distributions: normal(1000, 100), lognorm(s=0.1, scale=1000), with the parameters of scipy.stats."""
+
+import ast
+from typing import Any
+
+import numpy as np
+
+from problems.forms.assembly import Vector
+from problems.input.bounded_types import unknown
+
+SYNTAX = "[each] NAME(PARAMETERS) of scipy.stats, as in normal(1000, 100) or lognorm(s=0.1, scale=1000)"
+TAIL = 1e-9  # rarer values are not drawn: whether a key allows all is then known beforehand
+
+
+@np.errstate(invalid="ignore")
+def distribution(text: str) -> Any:
+    """A continuous distribution of scipy.stats with its parameters. Raises ValueError, which says why not."""
+    from scipy import stats  # slow to import: only where an input is random
+
+    try:
+        call: Any = ast.parse(text.strip(), mode="eval").body
+        name = {"normal": "norm"}.get(call.func.id, call.func.id)
+        values = [float(ast.literal_eval(value)) for value in call.args]
+        named = {str(one.arg): float(ast.literal_eval(one.value)) for one in call.keywords}
+    except (SyntaxError, ValueError, TypeError, AttributeError, RecursionError, MemoryError) as error:
+        raise ValueError(SYNTAX) from error
+    known = {key: value for key, value in vars(stats).items() if isinstance(value, stats.rv_continuous)}
+    if name not in known:
+        raise ValueError(unknown("distribution", name, sorted(known)))
+    order = ", ".join([*filter(None, [known[name].shapes]), "loc=0", "scale=1"])
+    try:
+        frozen = known[name](*values, **named)
+        if not np.isfinite(values_at(frozen, np.array([0.0, 0.5, 1.0]))).all():
+            raise TypeError(order)
+    except TypeError as error:
+        raise ValueError(f"{name}({order}), all finite, a scale above 0, shapes that it is for") from error
+    return frozen
+
+
+def values_at(frozen: Any, shares: Vector) -> Vector:
+    """The values (k,) at these shares, 0 to 1, of a distribution without its rarest TAIL at either end."""
+    return np.asarray(frozen.ppf(TAIL + (1 - 2 * TAIL) * shares))

@@ -1,0 +1,83 @@
+"""A series with random keys: its rows, the scene's own table, resumption, and cases in any order."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import harness
+from strip_scene import STRIP
+
+from harness.results import series_file
+from harness.series.load_case_source import GapCases
+from harness.series.session import Job, SeriesSession
+from problems.scene_files import read_scene
+
+TABLE = '\n[random]\nfasteners.preload = "each normal(60, 5)"\npressure.value = "uniform(0, 2e-4)"\n'
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(STRIP + TABLE, "utf-8")
+    return path
+
+
+def rows_of(directory: Path) -> list[dict[str, object]]:
+    timed = ("solve_s", "form_s", "setup_s", "commit", "clean", "warm_from")
+    return [{key: row[key] for key in row if key not in timed} for row in series_file.rows(directory)]
+
+
+def test_the_table_of_a_scene_and_its_options_are_drawn(scene: Path, tmp_path: Path) -> None:
+    more = "--random", "pressure.value=norm(1e-4, 1e-6)", "--allow-gap", 0.4
+    for out, counts in (("once", (9,)), ("twice", (4, 9))):
+        for count in counts:
+            done = harness("series", scene, "--cases", count, *more, "--out", tmp_path / out)
+            assert done.exit_code == 4, done.output
+    assert "the share of joints is between" in done.output
+    once = rows_of(tmp_path / "once")
+    assert [row["verdict"] for row in once] == ["within"] * 9
+    for row, again in zip(once, rows_of(tmp_path / "twice"), strict=True):
+        assert len(row["fasteners.preload"]) == 3
+        assert abs(row["pressure.value"] - 1e-4) < 6e-6
+        assert row.keys() == again.keys()
+        assert row["max_gap_mm"] == pytest.approx(again["max_gap_mm"], abs=1e-9)
+        assert all(row[key] == again[key] for key in row if "." in key)
+    other = harness("series", scene, "--cases", 9, "--out", tmp_path / "once")
+    assert other.exit_code == 2
+    assert "cases_key" in other.output
+
+
+def test_the_cases_do_not_depend_on_their_order_or_worker(scene: Path) -> None:
+    read = read_scene(str(scene))
+    cases = GapCases(count=12, random=read.random).of(read, "dual")
+    gaps = []
+    for numbers in ([*range(12)], [7, 3, 11, 0]):
+        session = SeriesSession(Job(scene=read, cases=cases.only(numbers), form="dual", check=0, threads=1))
+        gaps.append({row["case"]: gap for some in session.solve(numbers) for row, gap in some})
+    for case, gap in gaps[1].items():
+        np.testing.assert_allclose(gap, gaps[0][case], rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--random", "fasteners.preload=normal(60, 20)"), "must be greater than 0"),
+        (("--random", "ribs.I=normal(60, 20)"), "what changes K"),
+        (("--random", "pressure.value=norm()", "--sweep", "initial_gap.mean=1,2"), "random gaps, --gaps or"),
+    ],
+)
+def test_bad_random_keys_are_refused(
+    scene: Path, tmp_path: Path, options: tuple[str, ...], said: str
+) -> None:
+    done = harness("series", scene, *options, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert said in " ".join(done.output.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_random_keys_do_not_go_through_stages(scene: Path, tmp_path: Path) -> None:
+    text = scene.read_text().replace('kind = "pressure"', 'kind = "pressure"\nname = "air"')
+    scene.write_text(f'{text}\n[[stage]]\nname = "one"\non = ["air"]\n')
+    done = harness("series", scene, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "has stages" in done.output

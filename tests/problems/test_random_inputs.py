@@ -1,0 +1,166 @@
+"""Load cases with random keys: what a case is, on what it depends, its distributions, and bad inputs."""
+
+import pickle
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+from strip_scene import STRIP, write_strip
+
+from harness.series.load_case_source import GapCases
+from problems.build import load_case
+from problems.errors import InputError
+from problems.load_cases.random_inputs import RandomInputs
+from problems.load_cases.sweep import sweep
+from problems.model.scene import JointScene, Scene
+from problems.scene_files import read_scene
+
+PRELOAD, PRESSURE = "fasteners.preload=normal(60, 5)", "pressure.value=uniform(1e-4, scale=1e-4)"
+MEAN, SHIFT = "initial_gap.mean=norm(0.4, 0.01)", "fasteners.points.x=triang(0.5, -2, 4)"
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return read_scene(str(write_strip(tmp_path_factory.mktemp("strip"))))
+
+
+def drawn(scene: Scene, *random: str, count: int | None = 20, **more: int) -> RandomInputs:
+    cases = GapCases(count=count, random=random, **more).of(scene, "dual")
+    assert isinstance(cases, RandomInputs)
+    return cases
+
+
+def test_a_case_is_the_scene_with_the_values_of_its_row(scene: Scene, tmp_path: Path) -> None:
+    cases = drawn(scene, PRELOAD, PRESSURE, MEAN, SHIFT, seed=3)
+    for k in (0, 13):
+        row = cases.parameters(k)
+        points = [[x + row["fasteners.points.x"], y] for x, y in ((50.0, 30.0), (200.0, 0.0), (350.0, 60.0))]
+        written = write_strip(
+            tmp_path,
+            ("preload = 60.0", f"preload = {row['fasteners.preload']!r}"),
+            ("value = 1e-4", f"value = {row['pressure.value']!r}"),
+            ("mean = 0.4", f"mean = {row['initial_gap.mean']!r}"),
+            ("seed = 7", f"seed = {row['gap_seed']}"),
+            ("[[50.0, 30.0], [200.0, 0.0], [350.0, 60.0]]", str(points)),
+        )
+        wanted, load = load_case(read_scene(str(written))), cases.load(k)
+        np.testing.assert_allclose(load.f, wanted.f, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(load.g, wanted.g, rtol=0, atol=1e-15)
+
+
+def test_each_fastener_has_a_preload_of_its_own(scene: Scene) -> None:
+    assert isinstance(scene, JointScene)
+    cases = drawn(scene, f"{PRELOAD.replace('=', '=each ')}")
+    numbers = cases.parameters(4)["fasteners.preload"]
+    assert len(set(numbers)) == 3
+    unit = [load_case(scene, "dual", [scene.effects[1].only([k], scene.joint)]).f / 60 for k in range(3)]
+    others = load_case(scene, "dual", scene.effects[2:3]).f
+    np.testing.assert_allclose(cases.load(4).f, others + numbers @ np.array(unit), rtol=0, atol=1e-12)
+    assert drawn(scene, PRELOAD).load(4).f is not cases.load(4).f
+
+
+def test_a_case_depends_on_seed_and_number_and_an_input_on_its_name(scene: Scene) -> None:
+    few, many = drawn(scene, PRELOAD, PRESSURE, count=3), drawn(scene, PRESSURE, PRELOAD, MEAN, count=300)
+    late = many.parameters(250)
+    assert few.parameters(2).items() <= many.parameters(2).items()
+    assert pickle.loads(pickle.dumps(many)).parameters(250) == late
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(many)).load(250).f, many.load(250).f)
+    other = drawn(scene, PRELOAD, PRESSURE, count=3, seed=1)
+    assert not set(other.parameters(2).values()) & set(few.parameters(2).values())
+    assert len({few.key, other.key, many.key, drawn(scene, PRELOAD, count=3).key}) == 4
+    assert drawn(scene, PRELOAD, PRESSURE, count=9).key == few.key
+
+
+def test_without_a_random_gap_the_forces_alone_differ(tmp_path: Path) -> None:
+    scene = read_scene(str(write_strip(tmp_path, ("random = {", "# random = {"))))
+    cases = drawn(scene, PRELOAD)
+    assert list(cases.parameters(0)) == ["fasteners.preload"]
+    np.testing.assert_array_equal(cases.load(0).g, cases.load(1).g)
+    gaps = drawn(scene, MEAN)
+    assert gaps.load(0).f is gaps.load(1).f
+
+
+@pytest.mark.parametrize(
+    ("text", "law"),
+    [
+        ("normal(60, 5)", stats.norm(60, 5)),
+        ("lognorm(s=0.1, scale=60)", stats.lognorm(0.1, 0, 60)),
+        ("truncnorm(-2, 2, 60, 5)", stats.truncnorm(-2, 2, 60, 5)),
+        ("each weibull_min(3, scale=60)", stats.weibull_min(3, 0, 60)),
+    ],
+)
+def test_the_draws_have_the_distribution(scene: Scene, text: str, law: stats.rv_continuous) -> None:
+    cases = drawn(scene, f"fasteners.preload={text}", count=1500)
+    numbers = np.array([cases.values(k)[0] for k in range(cases.count)])
+    for column in numbers.T:
+        assert stats.kstest(column, law.cdf).pvalue > 1e-3
+    if numbers.shape[1] > 1:
+        assert abs(np.corrcoef(numbers.T) - np.eye(3)).max() < 4 / np.sqrt(cases.count)
+
+
+def test_the_cases_of_contributors_exchange_one_input_at_a_time(scene: Scene) -> None:
+    few, more = (drawn(scene, PRELOAD, PRESSURE, count=None, contributors=N) for N in (4, 8))
+    assert (few.count, more.count) == (4 * 5, 8 * 5)
+    assert few.key == more.key
+    plain = drawn(scene, PRELOAD, PRESSURE)
+    for j in range(4):
+        A, B, *exchanged = (few.parameters(5 * j + r) for r in range(5))
+        assert [plain.parameters(n) for n in (2 * j, 2 * j + 1)] == [A, B]
+        for name, row in zip(("fasteners.preload", "pressure.value", "gap_seed"), exchanged, strict=True):
+            assert row == A | {name: B[name]}
+        assert more.parameters(5 * j + 3) == exchanged[1]
+
+
+def test_a_sweep_shifts_all_points(scene: Scene, tmp_path: Path) -> None:
+    moved = sweep(scene, ["fasteners.points.y=0,10"]).load(1)
+    points = "[[50.0, 40.0], [200.0, 10.0], [350.0, 70.0]]"
+    wanted = write_strip(tmp_path, ("[[50.0, 30.0], [200.0, 0.0], [350.0, 60.0]]", points))
+    np.testing.assert_array_equal(moved.f, load_case(read_scene(str(wanted))).f)
+
+
+BAD = [
+    ("fasteners.preload=normal(60, 12)", "must be greater than 0"),  # its 1e-9 quantile is below 0
+    ("fasteners.preload=normal(60, -5)", "a scale above 0"),
+    ("fasteners.preload=normal(60, 5, 1)", "norm(loc=0, scale=1)"),
+    ("fasteners.preload=lognorm()", "lognorm(s, loc=0, scale=1)"),
+    ("fasteners.preload=weibull_min(-1)", "weibull_min(c, loc=0, scale=1)"),
+    ("fasteners.preload=norml(60, 5)", "did you mean norm"),
+    ("fasteners.preload=binom(3, 0.5)", "no such distribution"),
+    ("fasteners.preload=60", "[each] NAME(PARAMETERS)"),
+    ("fasteners.preload=normal(1e999, 1)", "all finite"),
+    ("fasteners.preload=normal(mean, 1)", "[each] NAME(PARAMETERS)"),
+    ("fasteners.points.x=normal(0, 20)", "on the junction"),
+    ("fasteners.preload", "[each] NAME(PARAMETERS)"),
+    ("pressure.value=each normal(0, 1)", "no elements at points"),
+    ("ribs.I=normal(2e3, 1)", "what changes K would be another assembly"),
+    ("initial_gap.random.seed=normal(7, 1)", "a valid integer"),
+]
+
+
+@pytest.mark.parametrize(("text", "allowed"), BAD)
+def test_a_bad_input_is_told_what_is_allowed(scene: Scene, text: str, allowed: str) -> None:
+    with pytest.raises(InputError, match=re.escape(allowed)):
+        drawn(scene, text)
+
+
+def test_all_faults_are_told_at_once(scene: Scene) -> None:
+    with pytest.raises(InputError) as error:
+        drawn(scene, PRELOAD, PRELOAD, "a=b", "fasteners.points.x=normal(0, -1)", count=None, contributors=3)
+    keys = [fault.key for fault in error.value.faults]
+    assert keys == ["key", "key", "distribution", "distribution", "N, inputs"]
+
+
+def test_the_table_random_of_a_scene(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(f'{STRIP}\n[random]\nfasteners.preload = "normal(60, 5)"\n"pressure.value" = "norm()"\n')
+    scene = read_scene(str(path))
+    assert isinstance(scene, JointScene)
+    assert scene.random == ("fasteners.preload=normal(60, 5)", "pressure.value=norm()")
+    path.write_text(f"{STRIP}\n[random]\nfasteners.preload = 5\n")
+    with pytest.raises(InputError, match=r"random.fasteners.preload = 5"):
+        read_scene(str(path))
+    path.write_text(f"random = 5\n{STRIP}")
+    with pytest.raises(InputError, match=r"random = 5"):
+        read_scene(str(path))
