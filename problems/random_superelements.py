@@ -26,7 +26,7 @@ from problems.model.superelement import Superelement
 from problems.model.superelement_joint import PairingTable, SuperelementJoint
 from problems.model.superelement_rows import NORMAL_ALONE
 
-from .random_scenes import Draw, draw_of, power_of_ten
+from .random_scenes import Draw, power_of_ten
 
 NAMES = ("wing", "frame", "strap")
 CLAMPED = (("south",), ("north",), ("south", "north"))
@@ -35,9 +35,9 @@ APART = 1.0  # mm, from one plate's nodes to the next one's
 LONGEST = 25  # mm, of an element beyond the junction
 
 
-def drawn_joint(name: str) -> JointScene:
+def drawn_joint(name: str, draw: Draw) -> JointScene:
     """The scene of a name; its matrices are made when they are needed."""
-    draw, file = draw_of(name), Path(name)
+    file = Path(name)
     names = NAMES[: draw(2, 3)]
     dofs = (NORMAL_ALONE, WITH_ROTATIONS)[draw(0, 1)]
     scattered, alike = draw(0, 1), draw(0, 1)

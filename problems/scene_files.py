@@ -20,18 +20,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
-from problems.input.bounded_types import resolved, unknown, validation_faults
+from problems.input.bounded_types import resolved, unknown, valid_table
 from problems.input.text_files import read_text
 from problems.ladders import make_rung, prefix_of, rung_names
-from problems.model.effect import Effect, StiffnessEffect
+from problems.model.effect import Effect
 from problems.model.effect_tables import EffectTable
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
-from problems.model.scene import JointScene, MatricesScene, Output, Scene
-from problems.model.stages import Plan, Stage, acting_effects
-from problems.random_scenes import EXAMPLES, SUPERELEMENT_NAME, drawn_table
+from problems.model.scene import GAPS_ALONE, JointScene, MatricesScene, Output, Scene
+from problems.model.stages import Plan, Stage
+from problems.random_scenes import EXAMPLES, SUPERELEMENT_NAME, draw_of, drawn_table
 
 from .errors import BACKSLASH, Fault, InputError
 
@@ -40,8 +39,6 @@ SCENES = FOLDER / "scenes"
 ASSEMBLIES = FOLDER / "assemblies"
 KEYS = ("title", "assembly", "joint", "effect", "stage", "output", "random", "matrices")
 TOML_MIB = 10
-#: The motions that are left to a plate, by the number of those that its supports hold.
-LOOSE = ("it moves and tilts freely", "it tilts about a point", "it tilts about a line")
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
 
 
@@ -57,13 +54,13 @@ def read_scene(name_or_path: str) -> Scene:
     Raises InputError naming the file, the key, the value and what is allowed, all faults at once.
     """
     if prefix := prefix_of(name_or_path):
-        if name_or_path not in (known := rung_names(prefix)):
-            raise _unknown_scene(name_or_path, known)
-        return make_rung(name_or_path)
+        if name_or_path in (names := rung_names(prefix)):
+            return make_rung(name_or_path)
+        raise _unknown_scene(name_or_path, names)
     if SUPERELEMENT_NAME.fullmatch(name_or_path):
         from problems.random_superelements import drawn_joint
 
-        return drawn_joint(name_or_path)
+        return drawn_joint(name_or_path, draw_of(name_or_path))
     if table := drawn_table(name_or_path):
         return _scene(name_or_path, SCENES / name_or_path, table)
     path = Path(name_or_path)
@@ -141,7 +138,10 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint_path, joint_data = _joint_table(path, data, faults)
     tables = _effect_tables(joint_path, joint_data, faults) if joint_path != path else []
     tables += _effect_tables(path, data, faults)
-    stages, output = _stages(path, data, faults), _output(path, data, faults)
+    tables_of_stages = enumerate(_tables(path, "stage", data, faults))
+    read = (valid_table(Stage, table, path, faults, f"stage[{k}]") for k, table in tables_of_stages)
+    stages = tuple(stage for stage in read if stage is not None)
+    output = valid_table(Output, data.pop("output", {}), path, faults, "output") or GAPS_ALONE
     random = tuple(_random(path, "", data.pop("random", {}), faults))
     faults += [Fault(str(path), key, value, unknown("key", key, KEYS)) for key, value in data.items()]
 
@@ -154,19 +154,12 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
             faults += table.faults(joint, () if stages else tables)
             faults += table.unknown_stages([stage.name for stage in stages]) if stages else ()
         if len(effects) == len(tables):
-            faults += _of_stages(path, joint_path, joint, effects, stages)
+            plan = Plan(effects, stages, joint)
+            faults += [Fault(str(path), *fault) for fault in plan.faults()]
+            faults += [Fault(str(joint_path), *fault) for fault in plan.floating()]
     if faults or joint is None:
         raise InputError(faults)
     return JointScene(name, title, joint, effects, stages, output, random)
-
-
-def _output(path: Path, data: dict[str, Any], faults: list[Fault]) -> Output:
-    """The table [output]; by default nothing more than gaps and displacements is computed."""
-    try:
-        return Output.model_validate(data.pop("output", {}))
-    except ValidationError as error:
-        faults += validation_faults(path, Output, error, "output")
-        return Output()
 
 
 def _random(path: Path, name: str, value: object, faults: list[Fault]) -> Iterator[str]:
@@ -185,34 +178,6 @@ def _random(path: Path, name: str, value: object, faults: list[Fault]) -> Iterat
                 'as in fasteners.preload = "normal(1000, 100)"',
             )
         )
-
-
-def _stages(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Stage, ...]:
-    """The stages that are right; `faults` says of the others what is wrong."""
-    stages = []
-    for k, table in enumerate(_tables(path, "stage", data, faults)):
-        try:
-            stages.append(Stage.model_validate(table))
-        except ValidationError as error:
-            faults += validation_faults(path, Stage, error, f"stage[{k}]")
-    return tuple(stages)
-
-
-def _of_stages(
-    path: Path, joint_path: Path, joint: AnyJoint, effects: tuple[Effect, ...], stages: tuple[Stage, ...]
-) -> Iterator[Fault]:
-    """Yield the faults of the stages, and of a part that is held in none, or not in a stage."""
-    plan = Plan(effects, stages, joint)
-    yield from (Fault(str(path), *fault) for fault in plan.faults())
-    if not isinstance(joint, Joint) or plan.wrong:
-        return
-    told: set[str] = set()
-    for step in plan.steps:
-        acting = tuple(acting_effects(effects, step.elements, joint).values())
-        where = f" in stage {step.name}" if step.name else ""
-        for fault in _floating(joint_path, joint, acting, where):
-            yield from () if fault.key in told else (fault,)
-            told.add(fault.key)
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:
@@ -244,14 +209,12 @@ def _joint(
     if is_own := isinstance(parts, list) and any(isinstance(p, dict) and "superelement" in p for p in parts):
         from problems.model.superelement_joint import SuperelementJoint, SuperelementJointTable
     model: Any = SuperelementJointTable if is_own else Joint
+    if (valid := valid_table(model, table, path, faults)) is None:
+        return None
     try:
-        valid = model.model_validate(table)
-        joint: AnyJoint = SuperelementJoint.of(path.parent, valid) if is_own else valid
+        joint: Any = SuperelementJoint.of(path.parent, valid) if is_own else valid
     except InputError as error:
         faults += error.faults
-        return None
-    except ValidationError as error:
-        faults += validation_faults(path, model, error)
         return None
     new = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
     if new:
@@ -272,22 +235,6 @@ def _tables(where: Path, key: str, data: dict[str, Any], faults: list[Fault]) ->
         faults.append(Fault(str(where), key, tables, f"tables [[{key}]]"))
         return []
     return tables
-
-
-def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...], where: str) -> Iterator[Fault]:
-    held: dict[str, list[tuple[float, float]]] = {part.name: [] for part in joint.part}
-    for effect in effects:
-        if isinstance(effect, StiffnessEffect) and effect.part in held:
-            held[effect.part] += effect.held_points
-    for part in joint.part:
-        points = held[part.name]
-        # A rigid motion of a plate is a + bx + cy: three points off a line hold it.
-        held_motions = np.linalg.matrix_rank([[1, x, y] for x, y in points] or [[0.0]])
-        if not part.clamped and held_motions < 3:
-            allowed = (
-                f"needs a clamped edge, or supports at three points off a line{where}: {LOOSE[held_motions]}"
-            )
-            yield Fault(str(path), f"part.{part.name}", points or "no support", allowed)
 
 
 def assembly_path(path: Path, name: object) -> Path:

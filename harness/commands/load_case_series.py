@@ -24,7 +24,7 @@ from harness.terminal.console import console_of
 from problems.errors import Fault, InputError
 from problems.load_cases import LoadCases
 from problems.load_cases.sweep import sweep as swept
-from problems.model.scene import JointScene
+from problems.model.scene import JointScene, Scene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
@@ -134,14 +134,14 @@ def run_series(
     refuse_inputs([directory / SERIES], inputs)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
     wanted = options.form or (earlier if earlier in made.forms else None)
-    if isinstance(read, JointScene) and read.stages:
+    if read.stages:
         _refuse_with_stages(read, (*sweep, *cases.random), options.plugin)
     count = swept(read, sweep).count if sweep else cases.count or RANDOM * (cases.contributors or 1)
     choice = chosen_form(read, made.forms, wanted, count)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
     chosen: LoadCases = swept(read, sweep, choice.form) if sweep else cases.of(last_scene(read), choice.form)
-    for sentence in (*(read.unusual if isinstance(read, JointScene) else ()), *chosen.notes):
+    for sentence in (*read.unusual, *chosen.notes):
         reporter.say(sentence)
     threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
     form_and_threads = {"form": choice.form, "threads": threads}
@@ -159,7 +159,7 @@ def run_series(
     return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], report)
 
 
-def _refuse_with_stages(scene: JointScene, keys: Sequence[str], plugin: Path | None) -> None:
+def _refuse_with_stages(scene: Scene, keys: Sequence[str], plugin: Path | None) -> None:
     """Raise InputError for what does not go through stages."""
     where = "--sweep, --random"
     faults = [Fault(where, "key", one, f"left out: {scene.name} has stages") for one in keys]

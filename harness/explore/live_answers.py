@@ -12,7 +12,6 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from harness.placement.candidates import movable_fasteners
 from harness.planning.form_choice import chosen_form
@@ -28,7 +27,7 @@ from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import DualLoadCase, LoadCase, Matrix, Vector
-from problems.input.bounded_types import validation_faults
+from problems.input.bounded_types import valid_table
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import locked, through
@@ -91,12 +90,10 @@ class Settings:
                 changes = {"mean": next(means)}
             elif isinstance(effect, Pressure):
                 changes = {"value": next(pressures)}
-            try:
-                new = type(effect).model_validate(effect.model_dump() | changes) if changes else effect
-            except ValidationError as error:
-                faults += validation_faults(PAGE, type(effect), error, effect.kind)
-                continue
-            made.append(new)
+            new: Effect | None = effect
+            if changes:
+                new = valid_table(type(effect), effect.model_dump() | changes, PAGE, faults, effect.kind)
+            made += [] if new is None else [new]
         for effect in made:
             others = [other for other in made if other is not effect and not scene.stages]
             wrong = effect.faults(scene.joint, others)

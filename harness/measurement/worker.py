@@ -25,7 +25,7 @@ from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures, s
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import Scene
 from problems.reporter import Reporter
 from problems.scene_files import read_scene
 from solvers.base import Answer
@@ -202,7 +202,7 @@ def scene_to_measure(measurements: Sequence[Measurement]) -> Scene:
     """The scene; of one with stages the last, but for a series, which takes no stages."""
     first = measurements[0]
     scene = read_scene(first.source)
-    if first.series is None and isinstance(scene, JointScene) and scene.stages:
+    if first.series is None and scene.stages:
         from harness.verification.reference_problem import last_stage
 
         return last_stage(scene, first.suite.reference_limit_s)

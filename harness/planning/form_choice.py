@@ -12,6 +12,7 @@ and only the sparse form takes them.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import log2
+from typing import TYPE_CHECKING
 
 from harness.results.provenance import physical_memory_mib
 from problems.build import models_of
@@ -22,6 +23,9 @@ from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 from problems.stiffness.dense_block import dense_slices
+
+if TYPE_CHECKING:
+    from problems.build import Model
 
 SMALL_MIB = 100.0  # of dense matrices, per load case
 MIB = 2**20
@@ -61,7 +65,17 @@ def size_of(scene: Scene, stored: bool = True) -> Size | None:
 
     stored : whether to look for the dense matrices in the cache.
     """
+    return _size(scene, models_of(scene), stored)
+
+
+def form_of_stages(scene: Scene) -> Form:
+    """The form in which the stages before the last are solved: the sparse one, unless matrices are dense."""
     models = models_of(scene)
+    sparse = _size(scene, models, stored=False) or any(model.dependent for model in models)
+    return "sparse" if sparse else "dual"
+
+
+def _size(scene: Scene, models: Sequence["Model"], stored: bool) -> Size | None:
     if isinstance(scene, JointScene) and isinstance(scene.joint, Joint):
         size = _of_joint(scene, scene.joint)
     elif (assembly := models[-1].stored_sparse) is not None:
@@ -70,11 +84,6 @@ def size_of(scene: Scene, stored: bool = True) -> Size | None:
         return None
     usable = stored and isinstance(scene, JointScene) and size.dense_peak_mib <= physical_memory_mib()
     return replace(size, stored=usable and all(model.built for model in models))
-
-
-def has_dependent_contacts(scene: Scene) -> bool:
-    """Whether contacts depend on one another, in some stage."""
-    return any(model.dependent for model in models_of(scene))
 
 
 def _of_given(assembly: Assembly) -> Size:
@@ -98,7 +107,7 @@ def _of_joint(scene: JointScene, joint: Joint) -> Size:
     Springs between parts are assumed to join all parts to one block. An element joins a node, with 4
     unknowns, to the next one on the next line: the half-bandwidth is 4 (nodes per line + 1) + 3.
     """
-    tied = any(scene.effects_of(SpringEffect))
+    tied = any(isinstance(effect, SpringEffect) for effect in scene.effects)
     (n, m), (nx, ny) = joint.size, joint.junction.nodes
     dense = _dense([n] if tied else [joint.node_count] * len(joint.part), m)
     # The lines y = const of each part's mesh that are not clamped.
@@ -143,8 +152,9 @@ def chosen_form(scene: Scene, taken: Sequence[Form], form: Form | None, cases: i
     """
     if form is not None and form not in taken:
         raise InputError.one("--form", "form", form, f"the solver takes {' and '.join(taken)}")
-    size = size_of(scene, stored=form is None)
-    if form is None and "sparse" in taken and has_dependent_contacts(scene):
+    models = models_of(scene)
+    size = _size(scene, models, stored=form is None)
+    if form is None and "sparse" in taken and any(model.dependent for model in models):
         choice = Choice("sparse", "contacts depend on one another")
     else:
         choice = _by_rule(size, taken, cases) if form is None else Choice(form)

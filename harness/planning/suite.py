@@ -24,7 +24,6 @@ from pydantic import (
     JsonValue,
     PositiveInt,
     Tag,
-    ValidationError,
 )
 
 from problems.errors import Fault, InputError
@@ -37,7 +36,7 @@ from problems.input.bounded_types import (
     is_word,
     resolved,
     unknown,
-    validation_faults,
+    valid_table,
 )
 from problems.ladders import prefix_of, rung_names
 from problems.random_scenes import EXAMPLES, drawn_names
@@ -186,13 +185,10 @@ def suite_from(data: dict[str, Any], path: Path) -> Suite:
 def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) -> Suite:
     """A suite from resolved data, as `to_toml` writes them. Raises InputError with `faults` and its own."""
     faults = list(faults)
-    try:
-        suite = Suite.model_validate(data)
-    except ValidationError as error:
-        faults += validation_faults(path, Suite, error)
-    else:
+    suite = valid_table(Suite, data, path, faults)
+    if suite is not None:
         faults += [*_indistinguishable(suite, path), *_of_series(suite, path)]
-    if faults:
+    if faults or suite is None:
         raise InputError(faults)
     return suite
 

@@ -68,7 +68,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "closest_mm": solution.closest_mm,
         "error_bound_mm": reference.bound_mm,
         "route": reference.route,
-        "unusual": scene.unusual if isinstance(scene, JointScene) else [],
+        "unusual": scene.unusual,
         **layout(problem.scene, data.assembly),
         "fasteners": list(fastener_forces(problem.scene, solution.x)),
         **({"stages": [_stage(stage) for stage in solution.stages]} if solution.stages else {}),

@@ -34,7 +34,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.input import matrix_files
 from problems.input.user_matrices import NAMES, checked
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import Scene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from report.document.numbers import counted
@@ -112,8 +112,7 @@ def export(
         with atomic_output(out, read.sources) as new:
             (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
         content = f"{form} form, {len(arrays['q'])} unknowns, {counted(about['m'], 'contact')}"
-    stages = read.stages if isinstance(read, JointScene) else ()
-    last = f"stage {stages[-1].name}, " if stages else ""
+    last = f"stage {read.stages[-1].name}, " if read.stages else ""
     console_of(reporter).print(f"{out}: {read.name}, {last}{content}.")
     return out
 

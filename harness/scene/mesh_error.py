@@ -80,7 +80,7 @@ def estimated(
     return MeshError(halved * 4 / 3, 3, float(np.log2(moved / halved)) if moved and halved else None, stress)
 
 
-def recorded(error: MeshError | None) -> dict[str, Any]:
+def mesh_record(error: MeshError | None) -> dict[str, Any]:
     """The entry `grid` of solution.json, with a sentence."""
     if error is None:
         return {"said": "Mesh error: not known here"}

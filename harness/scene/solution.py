@@ -13,7 +13,7 @@ from harness.planning.form_choice import Choice, chosen_form
 from harness.solving.session import answer_of, form_of
 from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM, Judgement
-from harness.verification.reference_problem import ReferenceProblem, opened
+from harness.verification.reference_problem import ReferenceProblem, open_stage
 from problems.errors import InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Matrix, Vector
@@ -194,16 +194,21 @@ def solve(
         choice = chosen_form(scene, forms, asked)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
-    if not (isinstance(scene, JointScene) and scene.stages):
-        return _solved(scene, named, choice, tolerance, limit_s, clock)
     like: ReferenceProblem | None = None
 
-    def of_stage(part: JointScene, approaches: Matrix) -> tuple[Vector, Solution]:
+    def answered(part: Scene) -> Solution:
         nonlocal like
-        clock.where = f"{part.title}: "
-        answer = _solved(locked(part, approaches[:, 0]), named, choice, tolerance, limit_s, clock, like)
+        answer = _solved(part, named, choice, tolerance, limit_s, clock, like)
         like = answer.problem
-        return like.prepared.assembly.at_junction(like.reference.x), answer
+        return answer
+
+    if not (isinstance(scene, JointScene) and scene.stages):
+        return answered(scene)
+
+    def of_stage(part: JointScene, approaches: Matrix) -> tuple[Vector, Solution]:
+        clock.where = f"{part.title}: "
+        answer = answered(locked(part, approaches[:, 0]))
+        return answer.problem.prepared.assembly.at_junction(answer.problem.reference.x), answer
 
     history = []
     for name, part, approaches, answer in through(scene, of_stage):
@@ -246,10 +251,10 @@ def _solved(
     clock: _Clock,
     like: ReferenceProblem | None = None,
 ) -> Solution:
-    """The judged answer to a scene without stages. like : see `opened`."""
+    """The judged answer to a scene without stages. like : see `open_stage`."""
     reporter, step = clock.reporter, clock.step
     with step("matrices, loads and gaps"):
-        problem = opened(scene, choice.form, reporter, limit_s, like)
+        problem = open_stage(scene, choice.form, reporter, limit_s, like)
         problem.prepared.assembly.K.ensure_factored()
         p = problem.prepared.overlap(problem.load)
     if np.isnan(p).any():

@@ -18,7 +18,6 @@ from harness.terminal import DONE, FAILED
 from harness.terminal.console import ConsoleReporter, show_verdict
 from problems.errors import InputError
 from problems.forms import Form
-from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 
 from . import allowed_gap, mesh_error
@@ -51,7 +50,7 @@ def solve_into(
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
     refuse_unwritable(out, scene.sources)
-    stressed = allow_stress is not None or (isinstance(scene, JointScene) and scene.output.stress)
+    stressed = allow_stress is not None or scene.output.stress
     if stressed:
         from . import stress  # only what a scene calls for
 
@@ -72,7 +71,7 @@ def solve_into(
         mesh = mesh_error.estimated(solution, refine, stress.largest_of if stressed else None)
     if mesh is not None:
         solution.seconds["mesh error"] = time.perf_counter() - begun
-    record["grid"] = mesh_error.recorded(mesh)
+    record["grid"] = mesh_error.mesh_record(mesh)
     console.print(f"{record['grid']['said']}.")
     if stressed:
         with reporter.step("stresses"):
@@ -80,15 +79,14 @@ def solve_into(
             for stage, line in zip(solution.stages, record.get("stages", ()), strict=True):
                 line["largest_stress"] = stress.largest_of(stage.scene, stage.x)
         arrays |= found.arrays
-        record["stress"] = stress.recorded(found, mesh, allow_stress)
+        record["stress"] = stress.stress_record(found, mesh, allow_stress)
     verdicts = [record["verdict"], *(stage.judgement.verdict for stage in solution.stages)]
     code = DONE if set(verdicts) == {"within"} else FAILED
-    if solution.stages:
-        if allow_gap_mm is not None:
-            allowed_gap.check_stages(solution.stages, allow_gap_mm, record["stages"])
-        console.print(_history(record, arrays))
     if allow_gap_mm is not None:
+        allowed_gap.check_stages(solution.stages, allow_gap_mm, record.get("stages", []))
         record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
+    if solution.stages:
+        console.print(_history(record, arrays))
     if allow_gap_mm is not None or stressed:
         from report.page.answer_page_data import headline  # slow to import: not before the answer is shown
 

@@ -88,7 +88,7 @@ class Stresses:
         return None if any((value + e > allowed).any() for value, e in told) else False
 
 
-def recorded(found: Stresses, mesh: MeshError | None, allowed: float | None) -> dict[str, Any]:
+def stress_record(found: Stresses, mesh: MeshError | None, allowed: float | None) -> dict[str, Any]:
     """The entry `stress` of solution.json: the largest von Mises stress, and a sentence with a verdict.
 
     kind : "pass", "fail", or "" without a limit or if it cannot be told.

@@ -58,7 +58,7 @@ def validate(scene: str | Path, *, reporter: Reporter = SILENT) -> Size | None:
     """
     read, console = read_scene(str(scene)), console_of(reporter)
     size = size_of(read)
-    if isinstance(read, JointScene) and read.output.stress:
+    if read.output.stress:
         from .stress import refuse_unusable  # only what a scene calls for
 
         refuse_unusable(None, read)
@@ -133,7 +133,7 @@ def _superelements(scene: JointScene, console: Console) -> None:
 
 def print_unusual(scene: Scene, console: Console) -> None:
     """Print what may be, but is rarely meant."""
-    for sentence in scene.unusual if isinstance(scene, JointScene) else ():
+    for sentence in scene.unusual:
         console.print(Text(f"{sentence}.", style="yellow"))
 
 

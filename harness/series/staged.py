@@ -137,5 +137,4 @@ class StagedSession:
 
 def session_of(job: Job) -> SeriesSession | StagedSession:
     """The session of a job in this process."""
-    staged = isinstance(job.scene, JointScene) and job.scene.stages
-    return StagedSession(job) if staged else SeriesSession(job)
+    return StagedSession(job) if job.scene.stages else SeriesSession(job)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.planning.form_choice import has_dependent_contacts, size_of
+from harness.planning.form_choice import form_of_stages
 from harness.results import records
 from harness.results.answer_files import read_answer
 from problems import storage
@@ -104,22 +104,28 @@ class ReferenceProblem:
 
 
 def opened(
+    scene: Scene, form: Form = "dual", reporter: Reporter = SILENT, limit_s: float | None = None
+) -> ReferenceProblem:
+    """Open or build a scene, of one with stages the last; see `open_stage`. Raises InputError."""
+    return replace(open_stage(last_stage(scene, limit_s), form, reporter, limit_s), scene=scene)
+
+
+def open_stage(
     scene: Scene,
-    form: Form = "dual",
+    form: Form,
     reporter: Reporter = SILENT,
     limit_s: float | None = None,
     like: ReferenceProblem | None = None,
 ) -> ReferenceProblem:
-    """Open or build a scene, of one with stages the last. Raises InputError.
+    """Open or build a scene without stages. Raises InputError.
 
     form : the form of the answers; in the sparse form, x has an entry per unknown of the model. like : a
     problem in this form whose matrices are taken, with their factors, if they are those of the scene.
     """
-    last = last_stage(scene, limit_s)
-    shared = like is not None and shares_stiffness(last, like.scene)
-    data = like.prepared if like is not None and shared else prepared(last, reporter, form)
+    shared = like is not None and shares_stiffness(scene, like.scene)
+    data = like.prepared if like is not None and shared else prepared(scene, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
-    return ReferenceProblem(scene, data, load_case(last, form), form, limit_s)
+    return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
 
 
 def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
@@ -131,13 +137,11 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
     """
     if not (isinstance(scene, JointScene) and scene.stages):
         return scene
-    sparse = size_of(scene, stored=False) or has_dependent_contacts(scene)
-    form: Form = "sparse" if sparse else "dual"
-    like: ReferenceProblem | None = None
+    form, like = form_of_stages(scene), None
 
     def solve(part: JointScene, approaches: Matrix) -> tuple[Vector, None]:
         nonlocal like
-        like = opened(locked(part, approaches[:, 0]), form, limit_s=limit_s, like=like)
+        like = open_stage(locked(part, approaches[:, 0]), form, limit_s=limit_s, like=like)
         return like.prepared.assembly.at_junction(like.reference.x), None
 
     def made() -> storage.Entry:

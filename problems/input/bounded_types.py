@@ -9,7 +9,7 @@ import stat
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints, ValidationError
 
@@ -17,6 +17,7 @@ from problems.errors import Fault, InputError
 
 LARGEST = 1e15  # in mm, N and units made of them
 MIB = 2**20
+M = TypeVar("M", bound=BaseModel)
 
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
@@ -82,6 +83,17 @@ def validation_faults(
         value = None if item["type"] == "missing" else item["input"]
         unit, allowed = _unit(model, item["loc"]), _allowed(item, model)
         yield Fault(str(where), key or "file", value, f"{allowed}; in {unit}" if unit else allowed)
+
+
+def valid_table(
+    model: type[M], table: object, where: object, faults: list[Fault], prefix: str = ""
+) -> M | None:
+    """The table as a `model`; None if it is none, which `faults` then says."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        faults += validation_faults(where, model, error, prefix)
+        return None
 
 
 def is_word(value: object) -> str:

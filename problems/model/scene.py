@@ -20,6 +20,15 @@ from .stages import Stage
 E = TypeVar("E", bound=Effect)
 
 
+class Output(Table):
+    """The table [output]: what an answer has besides displacements, gaps and forces."""
+
+    stress: bool = False
+
+
+GAPS_ALONE = Output()
+
+
 @dataclass(frozen=True)
 class PrintedOptimum:
     """The objective ½xᵀKx − fᵀx at the solution as a source prints it, and the number of digits."""
@@ -72,6 +81,21 @@ class Scene(ABC):
     def expected_size(self) -> tuple[int, int] | None:
         """Numbers (n, m) of unknowns and contacts; None if that takes reading the matrices."""
 
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """By default all effects act at once; see `stage_answers.through`."""
+        return ()
+
+    @property
+    def output(self) -> Output:
+        """What an answer has besides displacements, gaps and forces; in no key."""
+        return GAPS_ALONE
+
+    @property
+    def unusual(self) -> list[str]:
+        """A sentence on each parameter that is possible but rarely meant."""
+        return []
+
     def source_of(self, matrix: str) -> object:
         """The origin of a matrix, for error messages."""
         return f"scene {self.name}"
@@ -81,25 +105,18 @@ class Scene(ABC):
         return np.zeros((0, 2))
 
 
-class Output(Table):
-    """The table [output]: what an answer has besides displacements, gaps and forces."""
-
-    stress: bool = False
-
-
 @dataclass(frozen=True)
 class JointScene(Scene):
     """A joint and the effects that the scene includes.
 
-    stages : by default all effects act at once; see `stage_answers.through`. output, random : in no key.
-    random : the table [random], each entry as KEY=DISTRIBUTION; `series` draws them.
+    random : the table [random], each entry as KEY=DISTRIBUTION, in no key; `series` draws them.
     model : see `problems.build.model_of`; neither copied nor sent to a worker.
     """
 
     joint: AnyJoint
     effects: tuple[Effect, ...] = ()
     stages: tuple[Stage, ...] = ()
-    output: Output = field(default_factory=Output)
+    output: Output = GAPS_ALONE
     random: tuple[str, ...] = ()
     model: Any = field(default=None, init=False, repr=False, compare=False)
 
@@ -132,7 +149,6 @@ class JointScene(Scene):
 
     @cached_property
     def unusual(self) -> list[str]:
-        """A sentence on each parameter that is possible but rarely meant."""
         told = [("joint", self.joint.unusual())]
         told += [(effect.kind, effect.unusual(self.joint)) for effect in self.effects]
         if not self.stages:

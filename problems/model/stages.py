@@ -13,12 +13,16 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from problems.input.bounded_types import Name, unknown
 
-from .effect import Effect, SpringEffect
+from .effect import Effect, SpringEffect, StiffnessEffect
 from .interface import AnyJoint
-from .joint import Faults, Table
+from .joint import Faults, Joint, Table
 
+#: The motions that are left to a plate, by the number of those that its supports hold.
+LOOSE = ("it moves and tilts freely", "it tilts about a point", "it tilts about a line")
 SLICE = re.compile(r"(.+?)\s*\[\s*(\d*)\s*:\s*(\d*)\s*\]")
 #: Elements of effects: the number of the effect, and of the element. An effect without elements has one.
 Elements = frozenset[tuple[int, int]]
@@ -147,6 +151,24 @@ class Plan:
                 yield f"{where}.name", effect.name, allowed
         if self.stages and not self.wrong:
             yield from self._clashes()
+
+    def floating(self) -> Faults:
+        """Yield the plates that nothing holds in some stage, once each; none if names are wrong."""
+        told: set[str] = set()
+        if not isinstance(self.joint, Joint) or self.wrong:
+            return
+        for step in self.steps:
+            acting = acting_effects(self.effects, step.elements, self.joint).values()
+            held = [effect for effect in acting if isinstance(effect, StiffnessEffect)]
+            where = f" in stage {step.name}" if step.name else ""
+            for part in self.joint.part:
+                points = [point for one in held if one.part == part.name for point in one.held_points]
+                # A rigid motion of a plate is a + bx + cy: three points off a line hold it.
+                motions = np.linalg.matrix_rank([[1, x, y] for x, y in points] or [[0.0]])
+                if not part.clamped and motions < 3 and part.name not in told:
+                    told.add(part.name)
+                    needed = f"needs a clamped edge, or supports at three points off a line{where}"
+                    yield f"part.{part.name}", points or "no support", f"{needed}: {LOOSE[motions]}"
 
     def _clashes(self) -> Faults:
         """Yield the faults of effects that act together. A fastener may be set where a force presses."""

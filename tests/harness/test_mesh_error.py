@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness import load_scene, own_matrices, solve
-from harness.scene.mesh_error import estimated, on_mesh, recorded, remeshed
+from harness.scene.mesh_error import estimated, mesh_record, on_mesh, remeshed
 from harness.scene.solution import Solution
 from problems.model.scene import JointScene
 
@@ -66,7 +66,7 @@ def test_an_answer_without_a_coarser_mesh_says_so() -> None:
     gap = {"kind": "initial_gap", "mean": 0.5}
     assert estimated(solve({"joint": single, "effect": [gap]}, form="sparse")) is None
     given = own_matrices(np.eye(2), np.eye(2), [1.0, 2.0], [0.5, 3.0])
-    assert recorded(estimated(solve(given))) == {"said": "Mesh error: not known here"}
+    assert mesh_record(estimated(solve(given))) == {"said": "Mesh error: not known here"}
 
 
 def test_gaps_that_no_mesh_moves_leave_nothing_out() -> None:
