@@ -62,9 +62,10 @@ def solve(
 
     The stages of a scene are solved in turn, and told in a table; --allow-gap decides on the last one.
 
-    Two scenes with the same contacts, such as two plans of fasteners, are solved into DIR/first and
-    DIR/second and compared: gaps side by side, a map of the difference, the force in each fastener.
-    --allow-gap then decides on the second.
+    Two scenes on one junction, such as two plans of fasteners, are solved into DIR/first and DIR/second and
+    compared: gaps side by side, a map of the difference, the force in each fastener. --allow-gap then decides
+    on the second. If their meshes differ, gaps are compared at the contacts of the coarser one, and it is
+    said whether the mesh changes the verdict.
 
     \b
     Examples:
@@ -77,7 +78,7 @@ def solve(
     Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input,
                 3 --allow-gap or --allow-stress cannot be told from what is proven,
                 4 a gap is larger than --allow-gap, or a stress than --allow-stress,
-                5 the two scenes have other contacts.
+                5 the two scenes are of other parts in contact, or another junction.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.solve import solve_into

@@ -144,18 +144,18 @@ def _marks(record: dict[str, Any], part: dict[str, Any]) -> Marks:
     return record["marks"] | ({"supports": part["supports"]} if part["supports"] else {})
 
 
-def gap_maps(answers: list[Answer], names: list[str]) -> dict[str, Figure]:
-    """`gaps`, each pair of each of two scenes on one scale, and `difference`, the second minus the first."""
+def gap_maps(answers: list[Answer], names: list[str], common: list[Answer]) -> dict[str, Figure]:
+    """`gaps`, all pairs of two scenes on one scale; `difference`, second minus first at common places."""
     (_, one), (_, other) = answers
     scale = rooted("gap, mm", "viridis", one["gap_after"], other["gap_after"])
-    change = other["gap_after"] - one["gap_after"]
+    change = common[1][1]["gap_after"] - common[0][1]["gap_after"]
     size = float(abs(change).max()) or 1.0
     both = Scale("change of the gap, mm", "RdBu_r", Normalize(-size, size))
     sides = []
     for name, (record, arrays) in zip(names, answers, strict=True):
         closed = [(arrays["lam"] > 0, CLOSED, "closed contacts")]
         sides.append(_pairs(f"{name}: gap", (record, arrays), arrays["gap_after"], scale, closed))
-    changes = _pairs(f"{names[1]} minus {names[0]}", answers[1], change, both)
+    changes = _pairs(f"{names[1]} minus {names[0]}", common[1], change, both)
     with style.applied():
         sheet, _ = drawn([item for pair in zip(*sides, strict=True) for item in pair], 2)
         return {"gaps": sheet, "difference": drawn(changes, len(changes))[0]}

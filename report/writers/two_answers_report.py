@@ -1,19 +1,19 @@
 """Writes two answers on one junction: comparison.md, maps, tables of contacts and fasteners, index.html."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import scipy.sparse as sp
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
-from report.document.numbers import significant, whole
+from report.document.numbers import counted, position, significant, whole
 from report.figures.answer_maps import gap_maps
 from report.page.answer_page_data import two_answers_data
 from report.page.page_file import write as write_page
-from report.results.answer_record import Answer, contacts, fasteners, pair_name, read
-from report.results.series_results import Array
+from report.results.answer_record import VERDICTS, Answer, contacts, fasteners, pair_name, read
 from report.writers.sections_writer import written
 
 SIDES = ("first", "second")
@@ -23,16 +23,23 @@ CAPTIONS = {
 }
 
 
-def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
+def write(
+    directory: Path, folders: list[str], weights: Sequence[tuple[sp.csr_array, sp.csr_array]] | None
+) -> tuple[Path, pd.DataFrame, list[str]]:
     """Write DIRECTORY/comparison.md, with index.html, from two of its folders.
 
-    Returns the path of the former and the figures per pair.
+    Returns the path of the former, the figures per pair, and sentences on two meshes. weights : those of the
+    contacts of either answer at common places, pair by pair; None if their contacts are the same.
     """
-    (first, one), (second, other) = answers = [read(directory / folder) for folder in folders]
+    answers = [read(directory / folder) for folder in folders]
+    common = answers if weights is None else [*map(_at_places, answers, zip(*weights, strict=True))]
+    (first, one), (second, _) = answers
     names = [str(record["scene"]) for record, _ in answers]
     if names[0] == names[1]:
         names = folders
-    pairs = pd.DataFrame([_pair(pair, one, other) for pair in first["pairs"]])
+    table, of_both = _contacts(common), zip(first["pairs"], second["pairs"], strict=True)
+    pairs = pd.DataFrame([_pair(both, answers, table) for both in of_both])
+    said = [] if weights is None else [*_said_of_meshes(answers, table)]
     both = "the first scene, then the second"
     titles = [
         f"[{record['title']}]({folder}/answer.md)"
@@ -40,26 +47,56 @@ def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
     ]
     blocks: list[Block] = [
         Text(f"First: {titles[0]}. Second: {titles[1]}. Every contact: [contacts.csv](contacts.csv)."),
+        *([Text(" ".join(said))] if said else []),
         Table("pairs", f"*Gaps, mm, and contact forces, N: {both}.*", pairs, _columns()),
     ]
     if "contact_nodes" in one:
-        blocks += [Figure(name, CAPTIONS[name], made) for name, made in gap_maps(answers, names).items()]
+        maps = gap_maps(answers, names, common)
+        blocks += [Figure(name, CAPTIONS[name], made) for name, made in maps.items()]
     forces = _fasteners([first, second])
     if len(forces):
         columns = [word("kind", "kind"), word("contact", "contact"), number("x, mm", "x_mm")]
         columns += [number("y, mm", "y_mm"), *(number(side, f"{side}_N") for side in SIDES)]
         blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", forces, columns))
     title = f"{names[0]} and {names[1]}"
-    write_page(directory / "index.html", title, two_answers_data(answers))
-    sections, files = [Section("Two scenes on one junction", blocks)], {"contacts": _contacts(answers)}
-    return written(directory / "comparison.md", title, sections, files=files), pairs
+    write_page(directory / "index.html", title, two_answers_data(common))
+    sections, files = [Section("Two scenes on one junction", blocks)], {"contacts": table}
+    return written(directory / "comparison.md", title, sections, files=files), pairs, said
 
 
-def _pair(pair: dict[str, Any], one: dict[str, Array], other: dict[str, Array]) -> dict[str, Any]:
+def _at_places(answer: Answer, weights: Sequence[sp.csr_array]) -> Answer:
+    """The gaps of an answer at common places; no forces, which are those of the contacts of one mesh."""
+    (record, arrays), W = answer, sp.block_diag(weights, format="csr")
+    stops = np.cumsum([some.shape[0] for some in weights]).tolist()
+    ends = zip(record["pairs"], [0, *stops], stops, strict=False)
+    pairs = [pair | {"start": start, "stop": stop} for pair, start, stop in ends]
+    gaps = {name: W @ arrays[name] for name in ("contact_nodes", "gap_before", "gap_after")}
+    return record | {"pairs": pairs}, gaps | {"lam": np.full(W.shape[0], np.nan)}
+
+
+def _said_of_meshes(answers: list[Answer], table: pd.DataFrame) -> Iterator[str]:
+    """Yield where the gaps on two meshes differ most, and what the mesh does to the verdict."""
+    change, nodes = table["change_mm"].abs().to_numpy(), table[["x_mm", "y_mm"]].to_numpy()
+    k = int(change.argmax())
+    worst, at = table.to_dict("records")[k], position(nodes[k], nodes)
+    gaps = " and ".join(significant(worst[f"gap_after_{side}_mm"]) for side in SIDES)
+    most = f"Gaps on the two meshes differ by up to {significant(change[k])} mm"
+    yield f"{most}, at {at} ({worst['contact']}): {gaps} mm."
+    coarse = min(record["m"] for record, _ in answers)
+    if beyond := coarse - len(table):
+        yield f"Not compared: {beyond} of {counted(coarse, 'contact')}, beyond those of the other mesh."
+    if "allowed_gap" in answers[0][0]:
+        checks = [record["allowed_gap"] for record, _ in answers]
+        one, other = (VERDICTS[check["exceeded"]] for check in checks)
+        verdict = f"both are {one}" if one == other else f"the mesh decides: first {one}, second {other}"
+        yield f"With a limit of {checks[0]['allowed_mm']:g} mm, {verdict}."
+
+
+def _pair(both: Sequence[dict[str, Any]], answers: list[Answer], table: pd.DataFrame) -> dict[str, Any]:
     """The figures of a pair of parts in both scenes."""
-    here = slice(pair["start"], pair["stop"])
-    line: dict[str, Any] = {"contact": pair_name(pair)}
-    for side, arrays in zip(SIDES, (one, other), strict=True):
+    line: dict[str, Any] = {"contact": pair_name(both[0])}
+    for side, pair, (_, arrays) in zip(SIDES, both, answers, strict=True):
+        here = slice(pair["start"], pair["stop"])
         gap, force = arrays["gap_after"][here], arrays["lam"][here]
         line |= {
             f"initial_{side}_mm": arrays["gap_before"][here].max(),
@@ -68,7 +105,7 @@ def _pair(pair: dict[str, Any], one: dict[str, Array], other: dict[str, Array]) 
             f"closed_{side}": int((force > 0).sum()),
             f"force_{side}_N": float(np.nansum(force)),
         }
-    change = other["gap_after"][here] - one["gap_after"][here]
+    change = table.loc[table["contact"] == line["contact"], "change_mm"]
     closed, opened = (np.maximum(0.0, most) + 0.0 for most in (-change.min(), change.max()))  # no -0
     return line | {"most_closed_mm": closed, "most_opened_mm": opened}
 

@@ -9,9 +9,11 @@ import pytest
 from commands import harness
 from matplotlib.image import imread
 from small_joints import two_parts
+from superelements import write_part
 
 from harness.cli.scene import STARTER
 from harness.scene.fastener_forces import fastener_forces
+from harness.scene.two_scenes import common_places
 from problems.build import load_case, prepared
 from problems.scene_files import read_scene
 
@@ -96,7 +98,6 @@ def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("nodes = [9, 5]", "nodes = [9, 4]"),
         ("length = 160.0", "length = 170.0"),
         ('name = "a"', 'name = "c"'),
     ],
@@ -108,6 +109,73 @@ def test_scenes_with_other_contacts_are_refused(old: str, new: str, tmp_path: Pa
     assert done.exit_code == 5
     assert "second.toml: contacts" in done.stderr
     assert not (tmp_path / "both").exists()
+
+
+#: A gap that rises along x and y, which a bilinear surface has exactly; nothing closes.
+PLANE = """
+[[effect]]
+kind = "measured_gap"
+points = [[0.0, 0.0, 0.1], [160.0, 0.0, 0.26], [0.0, 80.0, 0.14], [160.0, 80.0, 0.3]]
+"""
+
+
+@pytest.mark.parametrize("nodes", [(17, 9), (6, 4)])
+def test_a_plane_gap_is_the_same_on_any_mesh(nodes: tuple[int, int], tmp_path: Path) -> None:
+    bare = two_parts(160.0, 80.0, (9, 5), "south") + PLANE
+    first = write(tmp_path / "first.toml", bare)
+    second = write(tmp_path / "second.toml", bare.replace("nodes = [9, 5]", f"nodes = {list(nodes)}"))
+    done = harness("solve", first, second, "--out", tmp_path / "both", "--allow-gap", 0.2)
+    assert done.exit_code == 4, done.output
+    table = rows(tmp_path / "both" / "contacts.csv")
+    assert len(table) == min(45, nodes[0] * nodes[1])
+    for row in table:
+        plane = 0.1 + 1e-3 * float(row["x_mm"]) + 5e-4 * float(row["y_mm"])
+        for side in ("first", "second"):
+            assert float(row[f"gap_after_{side}_mm"]) == pytest.approx(plane, abs=1e-12)
+    assert "both are FAIL" in (tmp_path / "both" / "comparison.md").read_text()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_superelements_are_compared_where_both_have_contacts(turned: bool, tmp_path: Path) -> None:
+    """Scattered nodes and a grid over the same square: a linear field is the same at all common places."""
+    rng = np.random.default_rng(0)
+    square = np.array([[0.0, 0.0], [90.0, 0.0], [0.0, 90.0], [90.0, 90.0]])
+    grid = np.stack(np.meshgrid(*2 * [np.linspace(0.0, 90.0, 7)]), axis=-1).reshape(-1, 2)
+    scenes = []
+    for name, nodes in (("few", np.concatenate([square, rng.uniform(5, 85, (20, 2))])), ("many", grid)):
+        (tmp_path / name).mkdir()
+        scenes.append(write(tmp_path / f"{name}.toml", ""))
+        for part, height in (("a", 0.0), ("b", 1.0)):
+            xyz = np.column_stack([nodes, np.full(len(nodes), height)])
+            table = write_part(tmp_path / name, part, np.eye(len(nodes)), xyz)
+            keys = "\n".join(f"{key} = '{value}'" for key, value in table.items())
+            scenes[-1].write_text(f"{scenes[-1].read_text()}[[joint.part]]\n{keys}\n")
+    ((few, many),) = common_places(*map(str, scenes[:: -1 if turned else 1])) or []
+    places = [read_scene(str(path)).joint.places(("a", "b")) for path in scenes]  # type: ignore[attr-defined]
+    one, other = (W @ at for W, at in zip((few, many), places[:: -1 if turned else 1], strict=True))
+    assert len(one) == 24
+    np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+def test_the_mesh_decides_a_verdict_near_the_limit(tmp_path: Path) -> None:
+    """Every second line of the fine mesh is one of the coarse mesh: there nothing is interpolated."""
+    first = write(tmp_path / "coarse.toml", JOINT + FASTENERS)
+    second = write(tmp_path / "fine.toml", (JOINT + FASTENERS).replace("nodes = [9, 5]", "nodes = [17, 9]"))
+    harness("solve", first, second, "--out", tmp_path / "once")
+    gaps = []
+    for name in ("first", "second"):
+        with np.load(tmp_path / "once" / name / "solution.npz") as saved:
+            gaps.append(saved["gap_after"])
+    at_coarse = gaps[1].reshape(9, 17)[::2, ::2].ravel()
+    table = rows(tmp_path / "once" / "contacts.csv")
+    change = np.array([float(row["change_mm"]) for row in table])
+    np.testing.assert_allclose(change, at_coarse - gaps[0], atol=1e-14)
+    assert 0 < abs(change).max() < 0.1
+    between = sum(gap.max() for gap in gaps) / 2
+    done = harness("solve", first, second, "--out", tmp_path / "both", "--allow-gap", between)
+    sides = ["FAIL" if gap.max() > between else "PASS" for gap in gaps]
+    assert sides[0] != sides[1]
+    assert f"the mesh decides: first {sides[0]}, second {sides[1]}" in done.output.replace("\n", " ")
 
 
 def test_the_starter_is_a_scene_that_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
