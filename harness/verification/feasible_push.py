@@ -47,7 +47,7 @@ class Push:
             if least >= ENOUGH:
                 break
             forces = np.where(closed, springs.rho * np.exp(np.minimum(least - opening, 0.0)), 0.0)
-            step = sprung.block(forces).solve(A @ forces)
+            step = sprung.factor(forces)(A @ forces)
             change = A.T @ step
             share = LONGEST / max(float(abs(change).max()), LONGEST)
             p, opening = p + share * step, opening + share * change

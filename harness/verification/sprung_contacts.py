@@ -15,7 +15,7 @@ are kept.
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Vector
 from problems.forms.sprung_stiffness import SprungStiffness
 from problems.stiffness.block import scaled
 
@@ -45,14 +45,10 @@ class SprungContacts:
         A, At, self.rho = springs.sprung.A, springs.sprung.A.T, springs.rho
         C = lam * compliance > y
         for _ in range(MAX_SETS):
-            self.C, self.K = C, springs.sprung.block(np.where(C, self.rho, 0.0))
-            gap = y - At @ self.K.solve(A @ np.where(C, self.rho * y, lam))
+            self.C, self.solve = C, springs.sprung.factor(np.where(C, self.rho, 0.0))
+            gap = y - At @ self.solve(A @ np.where(C, self.rho * y, lam))
             self.dlam = np.where(C, -self.rho * gap, -lam)
             wrong = np.where(C, lam + self.dlam, gap) < 0
             if not wrong.any():
                 return
             C = C ^ wrong
-
-    def solve(self, b: Matrix) -> Matrix:
-        """(K + ρA_C A_Cᵀ)⁻¹b."""
-        return self.K.solve(b)

@@ -98,8 +98,9 @@ def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
 
 
 def _of_unit_contacts(assembly: Assembly, like: Assembly) -> ApproximateInverse:
-    windows, inverse = None if assembly.dependent else _along_bands(assembly), None
-    if windows is not None and windows.work <= SETS * assembly.K.factorisation_flops:
+    windows, inverse = _along_bands(assembly), None
+    worth = windows is not None and windows.work <= SETS * assembly.K.factorisation_flops
+    if windows is not None and worth and not assembly.dependent:
         if _single_might_do(assembly):
             with suppress(np.linalg.LinAlgError):
                 inverse = _from_windows(like, windows, single=True)

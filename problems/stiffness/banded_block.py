@@ -1,8 +1,8 @@
 """A sparse block with a narrow band, in some numbering: K = LLᵀ in (b + 1) N numbers, LAPACK's dpbtrf."""
 
-from collections.abc import Sequence
-from functools import cached_property
-from typing import Any, Self
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,19 +24,37 @@ class BandedBlock(SparseBlock):
         super().__init__(matrix)
         self.width, self.order = width, order
 
-    def replaced(self, matrix: sp.csc_array) -> Self:
-        return type(self)(matrix, self.width, self.order)
-
     @cached_property
     def L(self) -> Matrix:
         """(b + 1, N), column-major: L[j + d, j] in row d. Raises NotPositiveDefinite."""
-        band = lower_band(self._ordered(self.matrix), self.width)
+        return self._factored(lower_band(self._ordered(self.matrix), self.width))
+
+    def _factored(self, band: Matrix) -> Matrix:
         smallest = self.lost * band[0]
         L, info = band_cholesky(band)
         lost = [info - 1] if info else np.flatnonzero(L[0] ** 2 <= smallest)
         if len(lost):
             raise NotPositiveDefinite(int(lost[0] if self.order is None else self.order[lost[0]]))
         return L
+
+    @cached_property
+    def _places(self) -> tuple[Indices, Indices]:
+        """The entries of the matrix that a band holds, and their places in it, column by column."""
+        M = self.matrix
+        rows, columns = M.indices, np.repeat(np.arange(self.size), np.diff(M.indptr))
+        if self.order is not None:
+            numbers = np.argsort(self.order)
+            rows, columns = numbers[rows], numbers[columns]
+        lower = np.flatnonzero(rows >= columns)
+        return lower, columns[lower] * self.width + rows[lower]
+
+    def solver(self, entries: Vector) -> Callable[[Matrix], Matrix]:
+        lower, places = self._places
+        band = np.empty((self.width + 1, self.size), order="F")
+        flat = band.ravel(order="K")
+        flat[:] = 0.0
+        flat[places] = entries[lower]
+        return partial(self._solved, self._factored(band))
 
     def _ordered(self, M: sp.csc_array) -> sp.csc_array:
         return M if self.order is None else sp.csc_array(M[self.order][:, self.order])
@@ -49,10 +67,13 @@ class BandedBlock(SparseBlock):
         return self.size * (self.width + 1)
 
     def solve(self, b: Matrix) -> Matrix:
+        return self._solved(self.L, b)
+
+    def _solved(self, L: Matrix, b: Matrix) -> Matrix:
         if self.order is None:
-            return band_solve(self.L, b)
+            return band_solve(L, b)
         x = np.empty_like(b)
-        x[self.order] = band_solve(self.L, b[self.order])
+        x[self.order] = band_solve(L, b[self.order])
         return x
 
     def shifted(self, D: Vector, s: float) -> float | None:

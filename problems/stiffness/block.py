@@ -1,8 +1,8 @@
 """One diagonal block of K, symmetric positive definite, whatever its storage and its factor."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
-from typing import Any, Self
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -96,8 +96,8 @@ class SparseBlock(Block):
         self.matrix = matrix
 
     @abstractmethod
-    def replaced(self, matrix: sp.csc_array) -> Self:
-        """Another matrix, zero wherever this one is, in the same numbering."""
+    def solver(self, entries: Vector) -> Callable[[Matrix], Matrix]:
+        """b → M⁻¹b, M with other entries (nnz,) at the same places. Raises NotPositiveDefinite."""
 
     @property
     def arrays(self) -> list[NDArray[Any]]:

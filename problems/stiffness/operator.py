@@ -233,6 +233,9 @@ class ScaledStiffness(Stiffness):
         """(DKD)⁻¹b = D⁻¹K⁻¹D⁻¹b."""
         return _times(1 / self.D, self.base.solve(_times(1 / self.D, b)))
 
+    def absolute_sums(self, D: Vector) -> Vector:
+        return self.D * self.base.absolute_sums(self.D * D)
+
     def least_eigenvalues(self, D: Vector, steps: int = POWER_STEPS) -> list[float]:
         return self.base.least_eigenvalues(self.D * D, steps)
 

@@ -5,8 +5,8 @@ Three numberings are tried: the given one, the one along the longer side of the 
 McKee's, until a band is as narrow as on a square grid; else the narrowest is taken, if it is worth it.
 """
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -68,8 +68,13 @@ class GeneralBlock(SparseBlock):
         self.width = width
         self.general_factor: SuperLU | Cholmod | None = None
 
-    def replaced(self, matrix: sp.csc_array) -> Self:
-        return type(self)(matrix, self.width)
+    def solver(self, entries: Vector) -> Callable[[Matrix], Matrix]:
+        K = self.matrix
+        matrix = sp.csc_array((entries, K.indices.copy(), K.indptr.copy()), shape=K.shape)
+        matrix.eliminate_zeros()
+        other = type(self)(matrix, self.width)
+        other.factor()
+        return other.solve
 
     def factor(self) -> list[NDArray[Any]]:
         self._ensured_factor()

@@ -117,14 +117,14 @@ class ContactSprings:
     def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
         """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
         A, At, lam, y, rho = self.A, self.compliance.At, start.lam, start.y, self.rho
-        K, change = self.sprung.block(np.where(C, rho, 0.0)), np.where(C, 0.0, -lam)
-        closed = At @ K.solve(A @ np.where(C, rho * y, lam))
+        inverse, change = self.sprung.factor(np.where(C, rho, 0.0)), np.where(C, 0.0, -lam)
+        closed = At @ inverse(A @ np.where(C, rho * y, lam))
         step = r = np.where(C, closed - y, 0.0)
         size, enough = float(r @ r), ENOUGH**2 * float(y[C] @ y[C])
         for _ in range(STEPS):
             if size <= enough:
                 break
-            given = At @ K.solve(A @ step)
+            given = At @ inverse(A @ step)
             alpha = size / float(step @ given)
             change, closed = change + alpha * step, closed - alpha * given
             r, last = np.where(C, closed - y, 0.0), size
@@ -144,7 +144,7 @@ class ContactSprings:
             return C
         rho = float(overlap @ overlap / (overlap @ (self.compliance @ overlap)))
         while rho < self.stiffest and C.any():
-            x = self.sprung.block(np.where(C, rho, 0.0)).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
+            x = self.sprung.factor(np.where(C, rho, 0.0))(load.f + A @ np.where(C, rho * load.g, 0.0))
             C, rho = self.compliance.At @ x > load.g, GROWTH * rho
         return C
 

@@ -25,9 +25,9 @@ from .interior_point import NewtonSteps, mehrotra
 from .newton_system import NewtonSystem, Solved, conjugate_gradients
 
 THETA = 0.995
-REFINEMENT, PRODUCTS = 1e-3, 20  # of a system, and its conjugate gradients at most
+REFINEMENT, PRODUCTS = 1e-2, 20  # of a system, and its conjugate gradients at most
 MAX_STEPS = 60
-SMALLEST = 1e-17  # of the first μ: λ is then the start of exact sets
+SMALLEST = 1e-15  # of the first μ: further steps are rounding
 
 
 class Sprung(NewtonSystem):
@@ -42,17 +42,21 @@ class Sprung(NewtonSystem):
 
     def update(self, D: Vector) -> int:
         self.springs = 1 / (D + 1 / self.rho)
-        self.K = self.sprung.block(self.springs)
+        self.inverse = self.sprung.factor(self.springs)
         return 1
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        """(Q + D) v = b − v/ρ for v from the springs; conjugate gradients where that is not small enough."""
         self.take(D)
+        v = self.near(b)
+        if v @ v <= tolerance**2 * self.rho * (b @ v):
+            return Solved(v, 0, True)
         return conjugate_gradients(self.times_H, b, tolerance, min(limit, PRODUCTS), self.near)
 
     def near(self, b: Vector) -> Vector:
         """About (Q + D)⁻¹ b."""
         A, At, rho = self.sprung.A, self.compliance.At, self.springs
-        return rho * (b - At @ self.K.solve(A @ (rho * b)))
+        return rho * (b - At @ self.inverse(A @ (rho * b)))
 
     def times_H(self, v: Vector) -> Vector:
         return self.compliance @ v + self.D * v
@@ -63,7 +67,7 @@ def interior_set(
 ) -> tuple[Mask, Vector, int]:
     """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took.
 
-    It ends with μ = λᵀy/m at 1e-17 of its first value. Closed is a contact whose λ falls less in the last
+    It ends with μ = λᵀy/m at 1e-15 of its first value. Closed is a contact whose λ falls less in the last
     step than its y, λ⁺/λ > y⁺/y (Tapia's indicators, which have no unit). p (m,) mm : the overlap without
     contact. compliance : about diag(Q). glued : about Q⁻¹p.
     """

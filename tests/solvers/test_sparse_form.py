@@ -18,7 +18,7 @@ from harness.verification.reference_problem import last_stage
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
-from problems.ladders.sparse import convex
+from problems.ladders.sparse import convex, monotone
 from problems.scene_files import read_scene, scene_names
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.operator import Stiffness
@@ -128,6 +128,18 @@ def test_forces_whose_rounding_is_above_the_tolerance() -> None:
     assert proven.bound_mm <= 1e-14
     off = replace(answer, lam=lam * (1 + 1e-13 * np.random.default_rng(0).standard_normal(len(lam))))
     assert with_x(problem_in(data, "sparse"), [off], [load], 1e-10)[0].status == "inaccurate"
+
+
+@pytest.mark.parametrize(
+    ("n", "seed", "difficulty"), [(500, 1009, 0.79), (500, 1011, 0.96), (3000, 1005, 0.69)]
+)
+def test_sets_end_soon_where_contacts_depend_on_one_another(n: int, seed: int, difficulty: float) -> None:
+    """An interior point that went on into rounding left sets that took a hundred more, or did not end."""
+    made = monotone(n, difficulty, seed).made
+    assert made is not None
+    answer = session_of("newton", Prepared(made.assembly)).next(made.load, None)
+    assert answer.status == "solved"
+    assert (answer.inner_iterations or 0) <= 40
 
 
 @pytest.mark.parametrize("with_nodes", [False, True])
