@@ -170,14 +170,8 @@ def _random(path: Path, name: str, value: object, faults: list[Fault]) -> Iterat
     elif name and isinstance(value, str):
         yield f"{name}={value}"
     else:
-        faults.append(
-            Fault(
-                str(path),
-                f"random.{name}".rstrip("."),
-                value,
-                'as in fasteners.preload = "normal(1000, 100)"',
-            )
-        )
+        key = f"random.{name}".rstrip(".")
+        faults.append(Fault(str(path), key, value, 'as in fasteners.preload = "normal(1000, 100)"'))
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:

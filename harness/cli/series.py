@@ -18,13 +18,10 @@ from .options import (
     MemoryLimit,
     Missing,
     Plugin,
-    Random,
-    Scans,
     SceneName,
     Scheduler,
     Seed,
     Spread,
-    Variance,
     error_reporting,
     option,
     table_options,
@@ -41,9 +38,10 @@ def series(
     correlation_length: Length = None,
     around: Around = None,
     gaps: Gaps = None,
-    scans: Scans = None,
-    variance: Variance = None,
-    random: Random = None,
+    random: Annotated[
+        list[str] | None,
+        option("KEY=LAW", "A random key, as fasteners.preload='normal(1000, 100)'. Repeatable."),
+    ] = None,
     columns: Columns = None,
     missing: Missing = None,
     sweep: Annotated[
@@ -74,6 +72,9 @@ def series(
     memory_limit: MemoryLimit = 8192,
     scheduler: Scheduler = None,
     allow_gap: AllowGap = None,
+    contributors: Annotated[
+        int | None, option("N", "Base points, a power of 2: what does each random input contribute?")
+    ] = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps and keys, measured gaps, or a sweep.
 
@@ -90,7 +91,6 @@ def series(
       python -m harness series 4386/1074 --random 'fasteners.preload=each normal(1000, 100)' \\
                                          --random 'pressure.0.value=uniform(2e-4, 1e-4)' --out results/random
       python -m harness series 4386/1074 --gaps measured.csv --out results/measured
-      python -m harness series 4386/0107 --scans 'scans/*.csv' --cases 500 --out results/batch
       python -m harness series 4386/1074 --gaps measured.csv --allow-gap 0.05 --out results/measured
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.2,0.4 \\
@@ -108,13 +108,12 @@ def series(
         from harness.terminal.console import ConsoleReporter, show_verdict
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        read_by = table_options(columns, missing)
-        sources = around, gaps, read_by, tuple(random or ()), None, scans, variance
+        read_by, law = table_options(columns, missing), (mean, sd, correlation_length)
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         outcome = run_series(
             scene,
             out,
-            GapCases(cases, seed, mean, sd, correlation_length, *sources),
+            GapCases(cases, seed, *law, around, gaps, read_by, tuple(random or ()), contributors),
             SeriesOptions(solver, form, *accuracy, threads, plugin, *limits),
             sweep=sweep or (),
             allow_gap_mm=allow_gap,

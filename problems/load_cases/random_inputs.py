@@ -25,8 +25,6 @@ from .distributions import distribution, values_at
 from .random_gaps import RandomGaps
 from .sweep import Key, allowed_keys, keys_of
 
-FIELD = "initial_gap.random"  # the field among the names of inputs
-
 
 @dataclass(frozen=True)
 class Input(Key):
@@ -35,6 +33,10 @@ class Input(Key):
     text: str
     law: Any
     elements: int
+
+    def draw(self, seed: int, n: int) -> Vector:
+        random = np.random.default_rng((seed, n, int(digest(self.name)[:16], 16)))
+        return values_at(self.law, random.random(max(self.elements, 1)))
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class RandomInputs(LoadCases):
 
     @property
     def facts(self) -> dict[str, Any]:  # type: ignore[override]
-        names = [one.name for one in self.inputs] + [FIELD] * bool(self.gaps)
+        names = [one.name for one in self.inputs] + ["initial_gap.random"] * bool(self.gaps)
         return {"inputs": names, "cases_per_point": len(names) + 2 if self.contributors else 1}
 
     def draws(self, k: int) -> list[int]:
@@ -74,15 +76,7 @@ class RandomInputs(LoadCases):
 
     def values(self, k: int) -> list[Vector]:
         """The numbers of each of `inputs` in case k."""
-        seeds = [
-            (self.seed, n, int(digest(one.name)[:16], 16))
-            for n, one in zip(self.draws(k), self.inputs, strict=False)
-        ]
-        shares = [
-            np.random.default_rng(seed).random(max(one.elements, 1))
-            for seed, one in zip(seeds, self.inputs, strict=True)
-        ]
-        return [values_at(one.law, share) for one, share in zip(self.inputs, shares, strict=True)]
+        return [one.draw(self.seed, n) for one, n in zip(self.inputs, self.draws(k), strict=False)]
 
     def parameters(self, k: int) -> dict[str, Any]:
         drawn = zip(self.inputs, self.values(k), strict=True)
@@ -90,68 +84,63 @@ class RandomInputs(LoadCases):
         return row | (self.gaps.parameters(self.draws(k)[-1]) if self.gaps else {})
 
     def load(self, k: int) -> LoadCase:
-        changed, gaps = dict(self.pieces), self.gaps
+        pieces = dict(self.pieces)
         for one, v in zip(self.inputs, self.values(k), strict=True):
-            pieces = changed[one.effect]
-            pairs = zip(pieces, np.resize(v, len(pieces)), strict=True)
-            changed[one.effect] = [one.changed(*pair, self.scene.joint) for pair in pairs]
-        effects = [piece for pieces in changed.values() for piece in pieces]
-        laws = [effect for effect in effects if gaps and isinstance(effect, InitialGap)]
+            pairs = zip(pieces[one.effect], np.resize(v, len(pieces[one.effect])), strict=True)
+            pieces[one.effect] = [one.changed(*pair, self.scene.joint) for pair in pairs]
+        effects = [effect for some in pieces.values() for effect in some]
+        laws = [effect for effect in effects if self.gaps and isinstance(effect, InitialGap)]
         change = load_case(self.scene, self.form, [effect for effect in effects if effect not in laws])
         g = self.rest.g + change.g
-        if gaps:
-            g += gaps.gap(self.draws(k)[-1], laws[0] if laws else gaps.field)
+        if self.gaps:
+            g += self.gaps.gap(self.draws(k)[-1], *(laws or [self.gaps.field]))
         return LoadCase(self.rest.f + change.f if change.f.any() else self.rest.f, g)
 
 
 def random_inputs(
     scene: Scene,
-    texts: Sequence[str],
+    laws: Sequence[str],
+    form: Form,
+    gaps: RandomGaps | None,
     count: int,
     seed: int,
-    form: Form,
-    gaps: RandomGaps | None = None,
-    base_points: int | None = None,
+    N: int | None,
 ) -> RandomInputs:
-    """Load cases of texts KEY=[each] DISTRIBUTION. Raises InputError with all faults.
+    """Load cases of laws KEY=[each] DISTRIBUTION. Raises InputError with all faults.
 
-    gaps : random gaps, one more input. base_points : N; the cases are then the N (d + 2) for contributors.
+    gaps : random gaps, one more input. N : base points; the cases are then the N (d + 2) for contributors.
     """
     if not isinstance(scene, JointScene):
-        raise InputError.one("--random", "key", ", ".join(texts), allowed_keys({}))
+        raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}))
     keys, faults, inputs = keys_of(scene), list[Fault](), list[Input]()
     if gaps and gaps.points is not None:  # a scan has one correlation length
         keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}
-    for name, law in [[part.strip() for part in text.partition("=")[::2]] for text in texts]:
-        key, bare, where = keys.get(name), law.removeprefix("each "), f"--random {name}"
+    for name, text in [[part.strip() for part in law.partition("=")[::2]] for law in laws]:
+        key, bare, where = keys.get(name), text.removeprefix("each "), f"--random {name}"
         if key is None or name in [one.name for one in inputs]:
             allowed = "one distribution of each key" if key else allowed_keys(keys)
             faults.append(Fault("--random", "key", name, allowed))
         try:
-            frozen = distribution(bare)
+            law = distribution(bare)
         except ValueError as error:
-            faults.append(Fault(where, "distribution", law, str(error)))
+            faults.append(Fault(where, "distribution", text, str(error)))
             continue
         if key:
-            elements = scene.effects[key.effect].element_count(scene.joint) if bare != law else 0
-            inputs.append(Input(**vars(key), text=law, law=frozen, elements=elements))
-            if bare != law and not elements:
-                faults.append(Fault(where, "each", law, "left out: it has no elements at points"))
-            for value in values_at(frozen, np.array([0.0, 1.0])).tolist():
-                faults += key.faults(scene, value, f"{where}={law}")
-    d, N = len(inputs) + bool(gaps), base_points
+            elements = scene.effects[key.effect].element_count(scene.joint) if bare != text else 0
+            inputs.append(Input(**vars(key), text=text, law=law, elements=elements))
+            if bare != text and not elements:
+                faults.append(Fault(where, "each", text, "left out: it has no elements at points"))
+            for value in values_at(law, np.array([0.0, 1.0])).tolist():
+                faults += key.faults(scene, value, f"{where}={text}")
+    d = len(inputs) + bool(gaps)
     if N is not None and (d < 2 or N < 2 or N & (N - 1)):
-        allowed = "a power of 2 from 2 on, and at least two random inputs"
-        faults.append(Fault("--contributors", "N, inputs", (N, d), allowed))
+        faults.append(Fault("--contributors", "N, inputs", (N, d), "a power of 2, and two inputs or more"))
     if faults:
         raise InputError(faults)
     effects = [gaps.field if gaps and isinstance(effect, InitialGap) else effect for effect in scene.effects]
     counts = {one.effect: one.elements for one in sorted(inputs, key=lambda one: one.elements)}
-    pieces = {
-        i: [effects[i].only([k], scene.joint) for k in range(q)] or [effects[i]] for i, q in counts.items()
-    }
-    fixed = [e for i, e in enumerate(effects) if i not in pieces and not (gaps and isinstance(e, InitialGap))]
-    notes = [f"{one.name}: {one.text}, median {one.law.median():.4g}" for one in inputs]
-    notes += gaps.notes if gaps else ()
-    cases = (count if N is None else N * (d + 2)), form, N is not None, tuple(notes)
-    return RandomInputs(scene, tuple(inputs), pieces, load_case(scene, form, fixed), gaps, seed, *cases)
+    each = {i: [effects[i].only([k], scene.joint) for k in range(q)] for i, q in counts.items()}
+    fixed = [e for i, e in enumerate(effects) if i not in each and not (gaps and isinstance(e, InitialGap))]
+    pieces, rest = {i: some or [effects[i]] for i, some in each.items()}, load_case(scene, form, fixed)
+    count, notes = (N * (d + 2) if N else count), (gaps.notes if gaps else ())
+    return RandomInputs(scene, tuple(inputs), pieces, rest, gaps, seed, count, form, bool(N), notes)

@@ -54,9 +54,8 @@ class Key:
         """The faults of this value."""
         effect = scene.effects[self.effect]
         try:
-            return [
-                Fault(where, *fault) for fault in self.changed(effect, value, scene.joint).faults(scene.joint)
-            ]
+            changed = self.changed(effect, value, scene.joint)
+            return [Fault(where, *fault) for fault in changed.faults(scene.joint)]
         except ValidationError as error:
             return list(validation_faults(where, type(effect), error, effect_name(scene, self.effect)))
 

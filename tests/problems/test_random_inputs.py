@@ -92,7 +92,7 @@ def test_without_a_random_gap_the_forces_alone_differ(tmp_path: Path) -> None:
     ],
 )
 def test_the_draws_have_the_distribution(scene: Scene, text: str, law: stats.rv_continuous) -> None:
-    cases = drawn(scene, f"fasteners.preload={text}", count=1500)
+    cases = drawn(scene, f"fasteners.preload={text}", count=600)
     numbers = np.array([cases.values(k)[0] for k in range(cases.count)])
     for column in numbers.T:
         assert stats.kstest(column, law.cdf).pvalue > 1e-3

@@ -1,0 +1,137 @@
+"""Contributors of a series: Sobol indices in closed form, by quadrature where contacts close, and files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from commands import harness
+from scipy import stats
+from strip_scene import write_strip
+
+from harness.results import series_file
+from harness.series.load_case_source import GapCases
+from harness.series.session import Job, SeriesSession
+from problems.build import prepared
+from problems.forms.assembly import LoadCase
+from problems.load_cases import Listed, LoadCases
+from problems.load_cases.random_inputs import RandomInputs
+from problems.model.scene import JointScene
+from problems.scene_files import read_scene
+from report.figures.contributors import indices
+from report.results.series_results import Series, read
+
+FIXED = ("random = {", "# random = {")
+
+
+def series_of(cases: RandomInputs, y: np.ndarray) -> Series:
+    """A series whose largest gaps are y, (cases,) mm."""
+    table = pd.DataFrame({"case": np.arange(len(y)), "max_gap_mm": y, "gap_error_mm": 1e-12})
+    facts = cases.facts | {"cases": cases.count}
+    return Series(facts, {}, table, None, None, np.zeros((0, 2)), [], pd.DataFrame())
+
+
+def drawn(scene: JointScene, N: int, *random: str) -> RandomInputs:
+    cases = GapCases(random=random, contributors=N).of(scene, "dual")
+    assert isinstance(cases, RandomInputs)
+    return cases
+
+
+def test_of_a_joint_without_contact(tmp_path: Path) -> None:
+    """y = g_j − (K⁻¹f)_j is linear in the inputs: S_i = a_i²σ_i² / Σ a_j²σ_j², which is the total, too."""
+    scene = read_scene(str(write_strip(tmp_path, FIXED, ("mean = 0.4", "mean = 9.0"))))
+    sd = {"initial_gap.mean": 0.2, "fasteners.preload": 5.0, "pressure.value": 2e-4}
+    means = {"initial_gap.mean": 9.0, "fasteners.preload": 60.0, "pressure.value": 1e-4}
+    texts = [f"{name}=normal({means[name]}, {sd[name]})" for name in sd]
+    texts[1] = texts[1].replace("=", "=each ")
+    cases, data = drawn(scene, 64, *texts), prepared(scene).assembly
+    j = 20
+    row = data.K.solve(data.A[:, [j]].toarray())[:, 0]
+
+    def gap(load: LoadCase) -> float:
+        return float(load.g[j] - row @ load.f)
+
+    found = indices(series_of(cases, np.array([gap(cases.load(k)) for k in range(cases.count)])))
+    preload, pressure = scene.effects[1:3]
+    points = [preload.model_copy(update={"points": (point,)}) for point in preload.points]
+    of_preload = sum((row @ one.force(scene.joint) / 60.0 * sd["fasteners.preload"]) ** 2 for one in points)
+    of_pressure = (row @ pressure.force(scene.joint) / 1e-4 * sd["pressure.value"]) ** 2
+    parts = np.array([sd["initial_gap.mean"] ** 2, of_preload, of_pressure])
+    exact = parts / parts.sum()
+    assert exact.min() > 0.05
+    assert_near(found, exact, exact)
+
+
+def assert_near(found: pd.DataFrame, first: np.ndarray, total: np.ndarray) -> None:
+    """Within twice the half-width of the 95 % interval, some four standard errors."""
+    for order, exact in (("first_order", first), ("total_order", total)):
+        width = found[f"{order}_high"] - found[f"{order}_low"]
+        assert 0 < width.min() < width.max() < 0.9
+        assert (abs(found[order] - exact) < width).all()
+
+
+def test_of_a_joint_in_contact(tmp_path: Path) -> None:
+    """The variances of E(y | x) by quadrature over the two inputs: y is piecewise linear in them."""
+    scene = read_scene(str(write_strip(tmp_path, FIXED, ("mean = 0.4", "mean = 0.2"))))
+    cases = drawn(scene, 64, "pressure.value=uniform(-4e-4, 8e-4)", "fasteners.preload=uniform(10, 50)")
+
+    def largest(some: LoadCases, count: int) -> np.ndarray:
+        session = SeriesSession(Job(scene=scene, cases=some, form="dual", check=0, threads=1))
+        return np.array([row["max_gap_mm"] for done in session.solve(range(count)) for row, _ in done])
+
+    preload, pressure = scene.effects[1:3]
+    loads = [
+        LoadCase(
+            preload.model_copy(update={"preload": 10 + 50 * (q + 0.5) / 10}).force(scene.joint)
+            + pressure.model_copy(update={"value": -4e-4 + 8e-4 * (p + 0.5) / 10}).force(scene.joint),
+            np.full(45, 0.2),
+        )
+        for p in range(10)
+        for q in range(10)
+    ]
+    y = largest(Listed(tuple(loads)), len(loads)).reshape(10, 10)
+    first = np.array([y.mean(axis=1).var(), y.mean(axis=0).var()]) / y.var()
+    assert 1 - first.sum() > 0.02  # the inputs act together
+    assert_near(indices(series_of(cases, largest(cases, cases.count))), first, 1 - first[::-1])
+
+
+def test_what_is_written(tmp_path: Path) -> None:
+    """The interval of a share counts two cases of a base point; more base points extend the series."""
+    scene, out = write_strip(tmp_path), tmp_path / "out"
+    command = "series", scene, "--random", "pressure.value=normal(1e-4, 1e-5)", "--out", out
+    for N in (2, 4):
+        done = harness(*command, "--contributors", N, "--allow-gap", 0.4)
+        assert done.exit_code == 4, done.output
+    assert "8 already in" in done.output
+    assert [row["case"] for row in series_file.rows(out)] == [*range(16)]
+    within = [row["max_gap_mm"] <= 0.4 for row in series_file.rows(out)]
+    kept = sum(within[k] for k in range(16) if k % 4 < 2)
+    low, high = stats.binomtest(kept, 8).proportion_ci(0.95, "exact")
+    assert f"between {low:.2%} and {high:.2%}" in " ".join(done.output.split())
+    table = pd.read_csv(out / "report/contributors.csv")
+    pd.testing.assert_frame_equal(table, indices(read(out)), rtol=1e-12)
+    assert table["input"].tolist() == ["pressure.value", "initial_gap.random"]
+    assert (out / "report/contributors.png").stat().st_size > 1000
+    lost = replace(read(out), cases=read(out).cases[1:])
+    assert indices(lost).empty
+
+
+def test_a_gap_that_does_not_vary_has_no_contributors(tmp_path: Path) -> None:
+    cases = drawn(read_scene(str(write_strip(tmp_path))), 2, "pressure.value=normal(1e-4, 1e-5)")
+    found = indices(series_of(cases, 0.1 + 1e-12 * np.arange(8) / 8))
+    assert not found.drop(columns="input").to_numpy().any()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--contributors", 3, "--random", "pressure.value=norm()"), "a power of 2"),
+        (("--contributors", 4), "--random, or [random] in the scene"),
+        (("--contributors", 4, "--cases", 9, "--random", "pressure.value=norm()"), "no --cases"),
+    ],
+)
+def test_bad_base_points_are_refused(tmp_path: Path, options: tuple[object, ...], said: str) -> None:
+    done = harness("series", write_strip(tmp_path), *options, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert said in " ".join(done.output.split())
