@@ -28,7 +28,7 @@ def option(metavar: str, help: str, *names: str, **limits: Any) -> Any:
 
 
 def table_options(columns: str | None, missing: list[str] | None) -> TableOptions:
-    """How --around, --gaps and --candidates are read, by --columns and --missing."""
+    """How --around, --scans, --gaps and --candidates are read, by --columns and --missing."""
     from problems.input.tables import TableOptions
 
     headings = [heading.strip() for heading in columns.split(",")] if columns else []
@@ -67,6 +67,12 @@ Around = Annotated[
 Gaps = Annotated[
     Path | None,
     option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
+]
+Scans = Annotated[
+    str | None, option("FILES", "Scans of many joints, as 'scans/*.csv': gaps vary by their principal modes.")
+]
+Variance = Annotated[
+    float | None, option("SHARE", "Of the scans' variance that the modes keep.  [default: 0.99]")
 ]
 Columns = Annotated[
     str | None,

@@ -35,6 +35,8 @@ def place(
     correlation_length: options.Length = None,
     around: options.Around = None,
     gaps: options.Gaps = None,
+    scans: options.Scans = None,
+    variance: options.Variance = None,
     columns: options.Columns = None,
     missing: options.Missing = None,
     scheduler: options.Scheduler = None,
@@ -66,6 +68,7 @@ def place(
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         read_by = options.table_options(columns, missing)
+        sources = around, gaps, read_by, (), None, scans, variance
         placement = place_fasteners(
             scene,
             out,
@@ -73,7 +76,7 @@ def place(
             allow_gap_mm=allow_gap,
             count=count,
             share=share,
-            cases=GapCases(cases, seed, mean, sd, correlation_length, around, gaps, read_by),
+            cases=GapCases(cases, seed, mean, sd, correlation_length, *sources),
             scheduler=scheduler,
             reporter=ConsoleReporter(console, plain=True),
         )

@@ -18,10 +18,12 @@ from .options import (
     MemoryLimit,
     Missing,
     Plugin,
+    Scans,
     SceneName,
     Scheduler,
     Seed,
     Spread,
+    Variance,
     error_reporting,
     option,
     table_options,
@@ -38,6 +40,8 @@ def series(
     correlation_length: Length = None,
     around: Around = None,
     gaps: Gaps = None,
+    scans: Scans = None,
+    variance: Variance = None,
     random: Annotated[
         list[str] | None,
         option("KEY=LAW", "A random key, as fasteners.preload='normal(1000, 100)'. Repeatable."),
@@ -91,6 +95,7 @@ def series(
       python -m harness series 4386/1074 --random 'fasteners.preload=each normal(1000, 100)' \\
                                          --random 'pressure.0.value=uniform(2e-4, 1e-4)' --out results/random
       python -m harness series 4386/1074 --gaps measured.csv --out results/measured
+      python -m harness series 4386/0107 --scans 'scans/*.csv' --cases 500 --out results/batch
       python -m harness series 4386/1074 --gaps measured.csv --allow-gap 0.05 --out results/measured
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.2,0.4 \\
@@ -108,12 +113,13 @@ def series(
         from harness.terminal.console import ConsoleReporter, show_verdict
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        read_by, law = table_options(columns, missing), (mean, sd, correlation_length)
+        read_by = table_options(columns, missing)
+        sources = around, gaps, read_by, tuple(random or ()), contributors, scans, variance
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         outcome = run_series(
             scene,
             out,
-            GapCases(cases, seed, *law, around, gaps, read_by, tuple(random or ()), contributors),
+            GapCases(cases, seed, mean, sd, correlation_length, *sources),
             SeriesOptions(solver, form, *accuracy, threads, plugin, *limits),
             sweep=sweep or (),
             allow_gap_mm=allow_gap,

@@ -114,7 +114,7 @@ def run_series(
     source, directory, solver = str(scene), Path(out), options.solver
     refuse_unusable(allow_gap_mm)
     read = read_scene(source)
-    if isinstance(read, JointScene) and not (sweep or cases.gaps):
+    if isinstance(read, JointScene) and not (sweep or cases.gaps or cases.scans):
         told = {text.partition("=")[0] for text in cases.random}
         in_scene = [text for text in read.random if text.partition("=")[0] not in told]
         cases = replace(cases, random=(*in_scene, *cases.random))
@@ -129,7 +129,7 @@ def run_series(
         faults.append(Fault("series", "tolerance, limit", accuracy, "must be positive and finite"))
     if faults:
         raise InputError(faults)
-    inputs = [Path(file) for file in (source, cases.around, cases.gaps, options.plugin) if file]
+    inputs = [Path(file) for file in (source, *cases.files, options.plugin) if file]
     refuse_unwritable(directory, inputs)
     refuse_inputs([directory / SERIES], inputs)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")

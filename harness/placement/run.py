@@ -40,6 +40,7 @@ from problems.input.tables import AS_NAMED
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
+from problems.load_cases.scan_modes import ScanModes
 from problems.model.scene import JointScene, Scene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene, scene_of
@@ -133,7 +134,7 @@ def place(
     """
     source, directory = str(scene), Path(out)
     refuse_unusable(allow_gap_mm)
-    inputs = [Path(file) for file in (scene, candidates, cases.around, cases.gaps) if file]
+    inputs = [Path(file) for file in (scene, candidates, *cases.files) if file]
     refuse_inputs([directory / name for name in OUTPUTS], inputs)
     movable = MovableFasteners.of(read_scene(source))
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
@@ -229,7 +230,7 @@ def _written_scene(
         assert isinstance(scene, JointScene)
         scene = replace(scene, effects=(*study.bare.effects, *scene.effects_of(Fasteners)))
     cases = cases_of(scene)
-    if result.samples and isinstance(cases, RandomGaps):
+    if result.samples and isinstance(cases, RandomGaps | ScanModes):
         cases = replace(cases, count=result.samples[-1].numbers[-1] + 1)
     return scene, cases
 

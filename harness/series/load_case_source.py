@@ -1,7 +1,8 @@
-"""Where the load cases of `series` and `place` come from: random gaps, or measured ones."""
+"""Where the load cases of `series` and `place` come from: random gaps, scans, or a table of measured gaps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from glob import glob
 from itertools import chain
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.random_inputs import random_inputs
+from problems.load_cases.scan_modes import VARIANCE, scan_modes
 from problems.model.scene import JointScene, Scene
 
 RANDOM = 100  # cases, if no number is given
@@ -39,6 +41,10 @@ class GapCases:
         KEY=DISTRIBUTION, keys of the scene that are random, as "fasteners.preload=each normal(1000, 100)".
     contributors : int, optional
         Number N of base points, a power of 2: the cases are the N (d + 2) that show what d inputs contribute.
+    scans : str, optional
+        Scans of many joints, as "scans/*.csv": the gaps vary about their mean by their principal modes.
+    variance : float, optional
+        The share of the variance of `scans` that the modes keep; by default 0.99.
     options : TableOptions, optional
         Headings of the scan's columns x, y and gap, and marks of missing gaps.
 
@@ -59,23 +65,33 @@ class GapCases:
     options: TableOptions = AS_NAMED
     random: tuple[str, ...] = ()
     contributors: int | None = None
+    scans: str | None = None
+    variance: float | None = None
+
+    @property
+    def files(self) -> list[str | Path]:
+        """The files that the cases are read from."""
+        return [*filter(None, (self.around, self.gaps)), *glob(self.scans or "")]
 
     def faults(self, sweep: Sequence[str] = (), table: str | None = None) -> list[Fault]:
         """A fault if the cases come from more than one source, or no table has headings. table : another that
         is read by the options.
         """
-        names = ("seed", "mean", "sd", "correlation_length", "around")
+        names = (*("seed",)[bool(self.scans) :], "mean", "sd", "correlation_length", "around")
         random = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
         random += ["--random"] * bool(self.random)
-        sources, faults = (["--gaps"] * bool(self.gaps), ["--sweep"] * bool(sweep), random), []
-        if self.options.columns and not (self.around or table):
-            allowed = "those of --around; the columns of --gaps are the contacts, in their order"
+        files = ["--scans"] * bool(self.scans), ["--gaps"] * bool(self.gaps)
+        sources, faults = (*files, ["--sweep"] * bool(sweep), random), []
+        if self.variance is not None and not (self.scans and 0 < self.variance <= 1):
+            faults.append(Fault("--variance", "share", self.variance, "above 0, at most 1, with --scans"))
+        if self.options.columns and not (self.around or self.scans or table):
+            allowed = "those of --around and --scans; the columns of --gaps are the contacts, in their order"
             faults.append(Fault("--columns", "headings", ", ".join(self.options.columns), allowed))
         if self.contributors is not None and (self.count is not None or not self.random):
             allowed = "--random, or [random] in the scene, and no --cases: there are N (inputs + 2)"
             faults.append(Fault("--contributors", "base points", self.contributors, allowed))
         if sum(map(bool, sources)) > 1:
-            allowed = "random gaps, --gaps or --sweep" if sweep else "random gaps or --gaps"
+            allowed = "--scans, random gaps, --gaps or --sweep" if sweep else "--scans, random gaps or --gaps"
             faults.append(Fault("cases", "given", " ".join(chain(*sources)), allowed))
         return faults
 
@@ -83,6 +99,9 @@ class GapCases:
         """The load cases of a scene. Raises InputError, as `measured_gaps` and `random_gaps` do."""
         if self.gaps:
             return measured_gaps(scene, self.gaps, self.count, form, self.options)
+        if self.scans:
+            draw = self.count or RANDOM, self.seed or 0, self.variance or VARIANCE
+            return scan_modes(scene, self.scans, *draw, form, self.options)
         law, gaps = (self.mean, self.sd, self.correlation_length), None
         count, seed = self.count or RANDOM, self.seed or 0
         fields = scene.effects_of(InitialGap) if isinstance(scene, JointScene) else ()

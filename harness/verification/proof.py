@@ -47,7 +47,7 @@ from .feasible_push import Push, nearly_closed
 from .sprung_contacts import Springs, SprungContacts
 
 MAX_PASSES = 30
-MAX_WORSE = 2  # passes in a row that do not halve the bound
+MAX_WORSE = 3  # passes in a row that do not halve the bound of the last: contact sets may still change
 MAX_PRODUCTS = 60  # of conjugate gradients in a pass
 REDUCTION = 1e-6  # of y_C in a pass
 FLAT = 2.0**-20  # of 1/ρ: a curvature of dependent contacts
@@ -145,7 +145,7 @@ class Proof:
         sharpness = Sharpness.COMPLIANT if quick else Sharpness.PLAIN
         r, s = units.residuals(load, x2, lam2, sharp=not quick)
         best = [Proven(x2[:, k], lam2[:, k], np.inf) for k in range(len(loads))]
-        worse = np.zeros(len(loads), dtype=int)  # passes since a bound was halved
+        worse, last = np.zeros(len(loads), dtype=int), np.full(len(loads), np.inf)
         cases = np.arange(len(loads))  # the load case of each column
         bounds, _ = self.bounds(x2, lam2, r, s, Sharpness.TRANSLATED if quick else sharpness)
         rounding = np.zeros(len(loads))  # the first pass is always worth it
@@ -154,7 +154,7 @@ class Proof:
             going = np.zeros(len(cases), dtype=bool)
             for column, k in enumerate(cases):
                 bound = float(bounds[column])
-                worse[k] = 0 if bound <= best[k].bound_mm / 2 else worse[k] + 1
+                worse[k], last[k] = 0 if bound <= last[k] / 2 else worse[k] + 1, bound
                 if bound < best[k].bound_mm:
                     best[k] = Proven(x2[:, column], lam2[:, column], bound)
                 going[column] = not (bounds[column] <= enough[column] or worse[k] == MAX_WORSE)

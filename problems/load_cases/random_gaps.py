@@ -27,6 +27,12 @@ from .gaps_through_scan import Scan, read_scan
 SEED_BITS = 53
 
 
+def case_seed(seed: int, k: int) -> int:
+    """The seed of the gap of case k of a series with this seed."""
+    state = np.random.SeedSequence((seed, k)).generate_state(1, np.uint64)[0]
+    return int(state) >> (64 - SEED_BITS)
+
+
 @dataclass(frozen=True)
 class RandomGaps(LoadCases):
     """Case k is the scene with its `initial_gap` drawn anew, with a seed derived from (seed, k).
@@ -50,8 +56,7 @@ class RandomGaps(LoadCases):
 
     def parameters(self, k: int) -> dict[str, Any]:
         """The seed which, written into the scene's `random`, gives this case, if there is no scan."""
-        state = np.random.SeedSequence((self.seed, k)).generate_state(1, np.uint64)[0]
-        return {"gap_seed": int(state) >> (64 - SEED_BITS)}
+        return {"gap_seed": case_seed(self.seed, k)}
 
     def load(self, k: int) -> LoadCase:
         return LoadCase(self.rest.f, self.rest.g + self.gap(k, self.field))

@@ -23,6 +23,7 @@ from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, 
 from harness.placement.fresh_cases import Cases, Goal, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question
+from harness.results import series_file
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
@@ -292,6 +293,23 @@ def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     few = harness("place", strip, "--gaps", tmp_path / "40.csv", *goal, tmp_path / "few")
     assert few.exit_code == 2
     assert "half of 40 rows are held back: take 144 rows, or a share of 1" in few.output
+
+
+def test_a_plan_for_joints_that_vary_as_scans_do(strip: Path, tmp_path: Path) -> None:
+    """Fresh joints of the same modes decide, and are the series of the plan."""
+    random = np.random.default_rng(2)
+    for k in range(6):
+        corners = [f"{x},{y},{0.05 + 0.01 * random.standard_normal()}" for x in (0, 200) for y in (0, 50)]
+        (tmp_path / f"scan{k}.csv").write_text("\n".join(("x,y,gap", *corners)))
+    goal = ("--candidates", "2x3", "--allow-gap", 0.06, "--share", 0.5, "--cases", 8)
+    scans = ("--scans", str(tmp_path / "scan*.csv"), "--variance", 0.9)
+    done = harness("place", strip, *scans, *goal, "--out", tmp_path / "out")
+    assert "principal modes of 6 scans keep" in done.output
+    record = records_of(tmp_path / "out")
+    fresh = record["samples"][-1]["numbers"]
+    assert min(fresh) >= 8
+    rows = series_file.rows(tmp_path / "out" / "plan")
+    assert [row["case"] for row in rows] == list(range(max(fresh) + 1))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 8])

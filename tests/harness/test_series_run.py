@@ -207,6 +207,9 @@ def test_what_cannot_be_together_is_said_at_once() -> None:
     assert "newton takes dual" in ended.output
     assert not Path("none").exists()
     series("--sweep", "initial_gap.mean=1:2:3", "--cases", "5", "--out", "none", code=2)
+    ended = series("--scans", "s*.csv", "--sd", "1", "--variance", "2", "--out", "none", code=2)
+    assert "--scans, random gaps or --gaps" in ended.output
+    assert "--variance: share = 2" in ended.output
     ended = series("--gaps", "gaps.csv", "--columns", "X,Y,Gap", "--out", "none", code=2)
     assert "--columns: headings = 'X, Y, Gap'" in ended.output
 

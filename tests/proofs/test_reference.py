@@ -10,6 +10,7 @@ from exact_answer import exact_solution
 from small_joints import make_joint, make_scene
 from small_problems import make_load, make_prepared
 
+from harness.cli.scene import STARTER
 from harness.conformance.known_problems import contact_rows
 from harness.measurement.task import why_not_judged
 from harness.planning.plan import expand
@@ -20,10 +21,11 @@ from harness.verification.judge import Judgement
 from harness.verification.proof import Proof
 from harness.verification.reference import STOPPED, best_of_candidates, reference
 from harness.verification.reference_problem import measurable
-from problems.build import prepared
+from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
+from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.base import Answer
 
@@ -154,3 +156,20 @@ def test_a_row_says_why_it_cannot_be_judged(tmp_path: Path) -> None:
     vars(wide)["reference"] = replace(problem.reference, bound_mm=1e-3, route=f"proven, {STOPPED}")
     assert why_not_judged(judgement, wide) == f"reference error bound 1e-03 mm: proven, {STOPPED}"
     assert why_not_judged(Judgement("within"), problem) is None
+
+
+def test_a_joint_of_lines_a_hair_apart_is_proven(tmp_path: Path) -> None:
+    """cond(K) is 1e12: the set changes over several passes before a bound shrinks."""
+    lines = (
+        ("nodes = [41, 9]", "nodes = [100, 4]"),
+        ("length = 600.0", "length = 60.0"),
+        ("edge = 40.0", "edge = 10.0"),
+    )
+    text, path = STARTER.read_text(), tmp_path / "lines.toml"
+    for old, new in lines:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+    scene = read_scene(str(path))
+    answer = reference(prepared(scene, form="sparse"), load_case(scene, "sparse"))
+    assert answer.bound_mm <= 1e-11

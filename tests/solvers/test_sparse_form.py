@@ -131,7 +131,7 @@ def test_forces_whose_rounding_is_above_the_tolerance() -> None:
 
 
 @pytest.mark.parametrize(
-    ("n", "seed", "difficulty"), [(500, 1009, 0.79), (500, 1011, 0.96), (3000, 1005, 0.69)]
+    ("n", "seed", "difficulty"), [(500, 1009, 19 / 24), (500, 1011, 23 / 24), (3000, 1005, 11 / 16)]
 )
 def test_sets_end_soon_where_contacts_depend_on_one_another(n: int, seed: int, difficulty: float) -> None:
     """An interior point that went on into rounding left sets that took a hundred more, or did not end."""
