@@ -11,7 +11,8 @@ from harness.measurement.solver_descriptions import described
 from harness.planning.form_choice import chosen_form
 from harness.results import series_file
 from harness.results.atomic_output import refuse_inputs, refuse_unwritable
-from harness.results.records import Row
+from harness.results.provenance import fingerprints
+from harness.results.records import Row, to_line
 from harness.results.schema import SERIES
 from harness.scene.allowed_gap import check_series, refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
@@ -129,7 +130,7 @@ def run_series(
         faults.append(Fault("series", "tolerance, limit", accuracy, "must be positive and finite"))
     if faults:
         raise InputError(faults)
-    inputs = [Path(file) for file in (source, *cases.files, options.plugin) if file]
+    inputs = [*read.sources, *(Path(file) for file in (*cases.files, options.plugin) if file)]
     refuse_unwritable(directory, inputs)
     refuse_inputs([directory / SERIES], inputs)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
@@ -152,7 +153,8 @@ def run_series(
     if allow_gap_mm is not None and code in (DONE, NOTHING_JUDGED):
         verdict = check_series(directory, allow_gap_mm)
     report = None
-    if series_file.read_facts(directory):
+    if written := series_file.read_facts(directory):
+        series_file.write_fact(directory, "series", to_line(written | {"inputs": fingerprints(inputs)}))
         from report.writers.series_report import write  # slow to import: not before the first row
 
         report = write(directory)

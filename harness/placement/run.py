@@ -25,6 +25,7 @@ from harness.placement.session import THREADS, FastenerStudy
 from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
+from harness.results.provenance import fingerprints
 from harness.scene.allowed_gap import refuse_unusable
 from harness.scene.scene_file import MOVED, edited, with_fasteners, with_gaps
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
@@ -200,7 +201,9 @@ def place(
         words, passed = sentence_on(result, goal, nodes)
         record = record_of(study, movable.current, holes, goal, result, nodes)
         labels = [names.get(place, "") for place in holes]
-        records.replace_object(directory / RECORD, record | {"said": words, "names": labels})
+        files = fingerprints([*study.bare.sources, *(file for file in inputs[1:] if file.is_file())])
+        told = {"said": words, "names": labels, "inputs": files}
+        records.replace_object(directory / RECORD, record | told)
         steps = zip(result.order[1:], result.order, strict=False)
         added = tuple(next(iter(set(step.plan) - set(earlier.plan))) for step, earlier in steps)
         return Placement(plans.get("plan"), added, passed, words, write(directory))

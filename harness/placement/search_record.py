@@ -65,6 +65,8 @@ def record_of(
         "steps": [entry(step) for step in result.steps],
         "best": None if result.best is None else entry(result.best),
         "order": [entry(step) for step in result.order],
+        "scene_key": study.bare.key,
+        "version": installed_version("rivetbench"),
         **provenance(),
     }
 

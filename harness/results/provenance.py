@@ -1,8 +1,10 @@
 """The origin of a row: the machine, its memory and versions; the commit of the code, and its changes."""
 
+import hashlib
 import os
 import platform
 import subprocess
+from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -37,6 +39,16 @@ def provenance() -> Provenance:
         return {"commit": __version__, "clean": None}
     changes = _git("status", "--porcelain", "--untracked-files=all", "--", *CODE)
     return {"commit": digits.strip(), "clean": None if changes is None else not changes}
+
+
+def fingerprints(files: Iterable[Path]) -> dict[str, str]:
+    """The SHA-256 of files by their names; of two of one name, the second by its path."""
+    digits: dict[str, str] = {}
+    for file in dict.fromkeys(files):
+        name = str(file) if file.name in digits else file.name
+        with file.open("rb") as content:
+            digits[name] = hashlib.file_digest(content, "sha256").hexdigest()
+    return digits
 
 
 def _git(*arguments: str) -> str | None:

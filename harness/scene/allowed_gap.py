@@ -144,7 +144,7 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
     elif kind:
         largest = f"the largest is {series.cases['max_gap_mm'].max():.3g} mm"
         said.append(f"PASS: in none of {cases} is a gap larger than {allowed_mm:g} mm; {largest}.")
-    check = {"kind": kind, "said": said}
+    check = {"kind": kind, "said": said, "allowed_mm": allowed_mm}
     facts = series_file.read_facts(directory) or {}
     series_file.write_fact(directory, "series", to_line(facts | {CHECK: check}))
     return check

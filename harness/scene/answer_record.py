@@ -11,7 +11,13 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from harness.results.provenance import machine, provenance, resident_mib
+from harness.results.provenance import (
+    fingerprints,
+    installed_version,
+    machine,
+    provenance,
+    resident_mib,
+)
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, Vector
@@ -59,6 +65,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "scene": scene.name,
         "title": scene.title,
         "scene_key": scene.key,
+        "inputs": fingerprints(scene.sources),
         "form": problem.form,
         "n": data.assembly.junction_size,
         "unknowns": data.assembly.n,
@@ -77,6 +84,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "steps": solution.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
         "machine": machine()["machine"],
+        "version": installed_version("rivetbench"),
         **provenance(),
         "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }

@@ -23,6 +23,7 @@ from rich.text import Text
 
 from harness.results.records import Row
 from problems.reporter import Reporter, Stage
+from report.document.verdict_colours import FAIL, PASS
 
 from . import DONE, GAP_EXCEEDED, NOTHING_JUDGED, READER_GONE
 
@@ -115,7 +116,7 @@ def _with_share(text: str, fraction: float) -> str:
 
 
 #: The exit code and colour of a verdict on an allowed gap, by its kind; "" where it cannot be told.
-VERDICTS = {"pass": (DONE, "green"), "fail": (GAP_EXCEEDED, "red"), "": (NOTHING_JUDGED, "yellow")}
+VERDICTS = {"pass": (DONE, PASS), "fail": (GAP_EXCEEDED, FAIL), "": (NOTHING_JUDGED, "yellow")}
 
 
 def show_verdict(kind: str, sentences: Sequence[str], console: Console) -> int:

@@ -30,6 +30,12 @@ def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:
     return f"({', '.join(f'{round(float(value), decimals) + 0.0:.10g}' for value in place)}) mm"
 
 
+def coordinate(value: object) -> str:
+    """1077.93, 30: a place on a part, mm, to 0.01 mm."""
+    number = as_number(value)
+    return MISSING if number is None else f"{round(number, 2) + 0.0:.10g}"
+
+
 def extent(values: NDArray[np.float64]) -> str:
     """'0.012 … 0.73': the least and the largest value. Zero, where the least is but rounding."""
     low, high = float(values.min()), float(values.max())

@@ -14,7 +14,20 @@ from report.results.answer_record import Answer, pair_name, stages, stress_map, 
 from . import style
 from .deformed_faces import deformed_figure
 from .gap_section import section_figure
-from .junction_maps import CLOSED, LARGER, RIM, Array, Map, Marks, Outlines, Scale, drawn, grid_of, rooted
+from .junction_maps import (
+    CLOSED,
+    LARGER,
+    RIM,
+    Array,
+    Map,
+    Marks,
+    Outlines,
+    Scale,
+    drawn,
+    grid_of,
+    larger_than,
+    rooted,
+)
 
 #: Colour and marker of the force in each kind of fastener over the stages.
 LINES = [
@@ -59,8 +72,7 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         [(arrays["lam"] > 0, CLOSED, "closed contacts")],
     )
     if allowed := record.get("allowed_gap"):
-        limit = allowed["allowed_mm"]
-        outlines.append((gaps[1] > limit, LARGER, f"gap of more than {limit:g} mm"))
+        outlines.append(larger_than(allowed["allowed_mm"], gaps[1]))
     sides = [
         _pairs(name, (record, arrays), gap, rooted(f"{name}, mm", "viridis", gap), lines)
         for name, gap, lines in zip(("gap before", "gap after"), gaps, ((), outlines), strict=True)

@@ -19,6 +19,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from report.document.escape import LONGEST_LABEL
+from report.document.verdict_colours import FAIL
 
 from . import style
 
@@ -30,7 +31,7 @@ Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
 #: Shapes of the marks; other kinds are crosses. More than MANY of a kind are small dots, which hide nothing.
 SHAPES = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 MANY = 60
-MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", "#E8112D", "#444444"
+MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", FAIL, "#444444"
 DOTS, DOT, RING = 4000.0, (4.0, 40.0), 8.0  # points² of all dots of a map, of one; points of a ring around it
 THINNEST = 0.02  # a map's shorter side over its longer one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
@@ -58,6 +59,11 @@ def rooted(label: str, colours: str, *values: Array) -> Scale:
     return Scale(f"{label}\n(√ scale)", colours, PowerNorm(0.5, low, high if high > low else low + 1.0))
 
 
+def larger_than(limit_mm: float, gap: Array) -> tuple[NDArray[np.bool_], str, str]:
+    """The outline of the gaps that are larger than a limit."""
+    return gap > limit_mm, LARGER, f"gap of more than {limit_mm:g} mm"
+
+
 @dataclass(frozen=True)
 class Map:
     """A field on `nodes`, with outlines of some of them."""
@@ -78,7 +84,7 @@ def drawn(maps: Sequence[Map], beside: int, corners: Array | None = None) -> tup
     """
     entries = {
         *(kind for item in maps for kind in item.marks),
-        *(o[2] for item in maps for o in item.outlines),
+        *(o[2] for item in maps for o in item.outlines if o[0].any()),
     }
     scales = list(dict.fromkeys(item.scale for item in maps))
     shown = np.concatenate([item.nodes for item in maps]) if corners is None else corners

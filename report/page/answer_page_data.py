@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from report.document.numbers import listed, out_of, position, significant
+from report.document.numbers import coordinate, listed, out_of, position, significant
 from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
 from report.page.page_figures import map_item
 from report.page.page_file import Data, banner
@@ -15,8 +15,8 @@ CODE = ("machine", "commit", "clean", "recorded_at")
 def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
     """The data of the page of one answer. record, arrays : from solution.json and solution.npz."""
     forces = [
-        [kind, contact, *map(significant, numbers)]
-        for kind, contact, *numbers in fasteners(record).itertuples(index=False)
+        [kind, contact, coordinate(x), coordinate(y), significant(force)]
+        for kind, contact, x, y, force in fasteners(record).itertuples(index=False)
     ]
     table = {
         "title": "Forces in the fasteners",

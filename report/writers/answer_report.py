@@ -1,5 +1,5 @@
 """Writes the answer of one scene: Markdown with pictures, CSV files of the nodal results, VTU, a page in HTML
-with maps, and one page of PDF.
+with maps, and a sheet to file.
 """
 
 import itertools
@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
-from report.document.numbers import extent, significant, whole
+from report.document.numbers import coordinate, extent, significant, whole
 from report.figures.answer_maps import answer_figures
 from report.figures.junction_maps import grid_of
 from report.page.answer_page_data import answer_data, facts, headline
@@ -27,8 +27,8 @@ from report.results.answer_record import (
     von_mises,
 )
 from report.results.series_results import Array
-from report.writers.answer_pdf import write_pdf
 from report.writers.sections_writer import written
+from report.writers.sheet import Sheet, exactness, origin, write_sheet
 
 #: Points, cells and point data for meshio.
 Grid = tuple[Array, list[tuple[str, Any]], dict[str, Array]]
@@ -87,8 +87,19 @@ def write(directory: Path) -> Path:
     verdict += [f"> **Warning.** {sentence}." for sentence in record.get("unusual", ())]
     page = written(directory / "answer.md", title, sections, verdict, files)
     pictures = [directory / f"{name}.png" for name in ("gap", "section") if name in figures]
-    write_pdf(directory / "answer.pdf", record, arrays, pictures)
+    tables = [block for block in blocks if isinstance(block, Table) and block.name in ("stages", "fasteners")]
+    write_sheet(directory / "answer.pdf", _sheet(record, arrays, pictures, tables))
     return page
+
+
+def _sheet(
+    record: dict[str, Any], arrays: dict[str, Array], pictures: list[Path], tables: list[Table]
+) -> Sheet:
+    verdict, check = headline(record, arrays), record.get("allowed_gap") or {}
+    sure = [exactness(check.get("uncertainty_mm", record["error_bound_mm"]))]
+    sure += [f"{text}." for text in (record["grid"]["said"], check.get("beyond_scan")) if text]
+    about = sure, origin(record), record.get("inputs", {}), pictures, tables, list(record.get("unusual", ()))
+    return Sheet(str(record["title"]), verdict["kind"], verdict["text"], *about)
 
 
 def _proven(record: dict[str, Any]) -> str:
@@ -112,7 +123,8 @@ def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
     blocks: list[Block] = []
     if len(forces := fasteners(record)):
         columns = [word("fastener", "kind"), word("contact", "contact")]
-        columns += [number("x, mm", "x_mm"), number("y, mm", "y_mm"), number("force, N", "force_N")]
+        columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
+        columns.append(number("force, N", "force_N"))
         blocks.append(Table("fasteners", "*The force in each fastener.*", forces, columns))
     pairs = []
     for pair in record["pairs"]:

@@ -11,11 +11,12 @@ from matplotlib.ticker import MaxNLocator
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import counted, significant, whole
+from report.document.numbers import coordinate, counted, significant, whole
 from report.figures import style
-from report.figures.junction_maps import Map, drawn, rooted
+from report.figures.junction_maps import Map, drawn, larger_than, rooted
 from report.results.series_results import read as read_series
 from report.writers.sections_writer import emptied, written
+from report.writers.sheet import MESH, Sheet, exactness, origin, write_sheet
 
 #: How a plan came about: its name in the table and the picture, and its look.
 FAMILIES = {
@@ -39,7 +40,25 @@ def write(directory: Path) -> Path:
         sections.append(Section("Where the gap is left", _maps(record, directory)))
         if record["order"]:
             sections.append(Section("In which order to set them", _order(record)))
-    return written(target / "report.md", title, sections)
+    page = written(target / "report.md", title, sections)
+    write_sheet(target / "sheet.pdf", _sheet(record, title, directory))
+    return page
+
+
+def _sheet(record: dict[str, Any], title: str, directory: Path) -> Sheet:
+    said, best = record["said"], record["best"]
+    kind = {"PASS": "pass", "FAIL": "fail"}.get(said.partition(":")[0], "")
+    solved = read_series(directory / ("plan" if best else "own"))
+    facts = _summary(record).data.set_index("what")["value"]
+    samples = [f"{name}: {text}." for name, text in facts.items() if ", round" in str(name)]
+    sure = [exactness(float(solved.cases["gap_error_mm"].max())), *samples, MESH]
+    places = pd.DataFrame(best["plan"] if best else [], columns=["x", "y"])
+    places.insert(0, "number", range(1, len(places) + 1))
+    columns = [number("no.", "number", whole), *(number(f"{axis}, mm", axis, coordinate) for axis in "xy")]
+    plan = Table("plan", "*The plan.*", places, columns)
+    picture = directory / "report" / "before-and-after.png"
+    about = origin(record), record.get("inputs", {}), [picture] if picture.exists() else []
+    return Sheet(title, kind, said, sure, *about, [plan])
 
 
 def _summary(record: dict[str, Any]) -> Table:
@@ -123,7 +142,10 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
         pieces = [np.quantile(some, share, axis=0) for some in series.of_contacts()]
         shown.append((text, series.nodes, np.concatenate(pieces), series.marks))
     scale = rooted("gap, mm", "viridis", *(values for _, _, values, _ in shown))
-    maps = [Map(text, nodes, gap, scale, (), marks) for text, nodes, gap, marks in shown]
+    limit = np.inf if record["limit_mm"] is None else record["limit_mm"]
+    maps = [
+        Map(text, nodes, gap, scale, [larger_than(limit, gap)], marks) for text, nodes, gap, marks in shown
+    ]
     caption = f"*The gap at each contact that {100 * share:.4g} % of the fresh cases keep*, before and after."
     table = pd.DataFrame({"x_mm": shown[0][1][:, 0], "y_mm": shown[0][1][:, 1]})
     table = table.assign(**{f"{name}_mm": gap for name, (_, _, gap, _) in zip(names, shown, strict=True)})
@@ -147,9 +169,9 @@ def _order(record: dict[str, Any]) -> list[Block]:
     axes.plot(table["set"], table["gap_mm"], color=style.BLUE, marker="o", ms=4)
     axes.set(xlabel="fasteners set", ylabel="largest gap, mm", ylim=(0, None))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    names = {"x, mm": "x_mm", "y, mm": "y_mm", "gap after it, mm": "gap_mm"}
     columns = [number("set", "set", whole), *([word("hole", "name")] if labels else [])]
-    columns += [number(name, key) for name, key in names.items()]
+    columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
+    columns.append(number("gap after it, mm", "gap_mm"))
     caption = "*The order that keeps the gap small*: the reverse of removing what is needed least."
     return [
         Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),

@@ -1,4 +1,4 @@
-"""Writes the report of a series: report.md, PNG and CSV, and a page in HTML with the maps."""
+"""Writes the report of a series: report.md, PNG and CSV, a page in HTML with maps, and a sheet to file."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from report.document.escape import file_name
 from report.document.numbers import counted, out_of, significant, tidy_power
 from report.figures import style
 from report.figures.contributors import bars, indices
-from report.figures.junction_maps import Map, drawn, rooted
+from report.figures.junction_maps import Map, drawn, larger_than, rooted
 from report.page.contact_maps import hover_names, map_controls, series_maps
 from report.page.page_figures import exceedance_figure, item, map_item
 from report.page.page_file import Data, banner
@@ -28,6 +28,7 @@ from report.results.series_results import (
     read,
 )
 from report.writers.sections_writer import emptied, written
+from report.writers.sheet import MESH, Sheet, exactness, origin, write_sheet
 
 MAPPED = (0.5, 0.95, 0.99)
 PERCENT = {q: f"{100 * q:g} % quantile" for q in QUANTILES}
@@ -39,9 +40,9 @@ CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": 
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md from the series in DIRECTORY, and index.html beside it.
+    """Write DIRECTORY/report/report.md from the series in DIRECTORY, with index.html and sheet.pdf beside it.
 
-    Returns the path of the former.
+    Returns the path of the first.
     """
     series = read(directory)
     target = emptied(directory / "report")
@@ -63,7 +64,30 @@ def write(directory: Path) -> Path:
         write_page(
             target / "index.html", title, series_data(series, maps, [*PERCENT.values(), "mean"], curve)
         )
-    return written(target / "report.md", title, sections)
+    page = written(target / "report.md", title, sections)
+    if len(series.cases):
+        write_sheet(target / "sheet.pdf", _sheet(series, directory, target))
+    return page
+
+
+def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
+    facts, check = series.facts, series.facts.get("allowed_gap") or {"kind": "", "said": []}
+    *sure, verdict = check["said"] or [f"The largest gap left is {_largest(series)}."]
+    sure = [exactness(float(series.cases["gap_error_mm"].max())), *sure, MESH]
+    pictures = [directory / "allowed-gap.png", target / "worst-case.png", target / "quantile-maps.png"]
+    record = facts | {
+        "commit": series.code["commit"].iloc[-1],
+        "scene_key": facts["identity"].get("scene_key"),
+    }
+    record["version"] = (facts.get("versions") or {}).get("rivetbench", "")
+    about = origin(record), facts.get("inputs", {}), [file for file in pictures if file.exists()][:2]
+    return Sheet(str(facts["title"]), check["kind"], verdict, sure, *about, [_statistics(series)])
+
+
+def _largest(series: Series) -> str:
+    largest = series.cases["max_gap_mm"]
+    worst = int(series.cases["case"].to_numpy()[largest.to_numpy().argmax()])
+    return f"{significant(largest.max())} mm, in case {worst}"
 
 
 def _summary(series: Series) -> Table:
@@ -78,11 +102,10 @@ def _summary(series: Series) -> Table:
     if len(cases):
         bounds, checked = cases["bound_mm"].dropna(), cases["displacement_error_mm"].dropna()
         largest, seconds = cases["max_gap_mm"], cases[list(STEPS)]
-        worst = int(cases["case"].to_numpy()[largest.to_numpy().argmax()])
         rate = significant(len(cases) / float(seconds.sum().sum()))
         compared = counted(len(checked), "case")
         summary |= {
-            "largest gap left": f"{significant(largest.max())} mm, in case {worst}",
+            "largest gap left": _largest(series),
             "median of the largest gaps": f"{significant(largest.median())} mm",
             "proven error bound": f"{significant(bounds.max())} mm, {len(cases) - len(bounds)} unproven",
             "error beside the reference": f"{significant(checked.max())} mm, {compared} compared",
@@ -117,7 +140,8 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
     }
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
     quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
-    worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), (), series.marks)
+    limit = larger_than((series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf), gap)
+    worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), [limit], series.marks)
     caption = "*The remaining gap at each contact: quantiles over the cases.*"
     of_worst = f"*The worst case, number {case}, with a largest gap of {significant(gap.max())} mm.*"
     return [

@@ -9,7 +9,7 @@ import pandas as pd
 import scipy.sparse as sp
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
-from report.document.numbers import counted, position, significant, whole
+from report.document.numbers import coordinate, counted, position, significant, whole
 from report.figures.answer_maps import gap_maps
 from report.page.answer_page_data import two_answers_data
 from report.page.page_file import write as write_page
@@ -55,8 +55,9 @@ def write(
         blocks += [Figure(name, CAPTIONS[name], made) for name, made in maps.items()]
     forces = _fasteners([first, second])
     if len(forces):
-        columns = [word("kind", "kind"), word("contact", "contact"), number("x, mm", "x_mm")]
-        columns += [number("y, mm", "y_mm"), *(number(side, f"{side}_N") for side in SIDES)]
+        columns = [word("kind", "kind"), word("contact", "contact")]
+        columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
+        columns += [*(number(side, f"{side}_N") for side in SIDES)]
         blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", forces, columns))
     title = f"{names[0]} and {names[1]}"
     write_page(directory / "index.html", title, two_answers_data(common))

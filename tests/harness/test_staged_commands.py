@@ -25,7 +25,7 @@ from problems.forms import Form
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
-from report.writers import answer_pdf
+from report.writers import sheet
 from rivetbench import export, judge, validate
 
 EFFECTS = """
@@ -98,14 +98,14 @@ def test_the_history_is_in_all_that_solve_writes(
     staged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The clamped parts keep the limit, the released ones do not: the exit code is that of the last stage."""
-    sheets: list[answer_pdf._Page] = []
+    pages: list[sheet._Page] = []
 
-    class Kept(answer_pdf._Page):
+    class Kept(sheet._Page):
         def __init__(self) -> None:
             super().__init__()
-            sheets.append(self)
+            pages.append(self)
 
-    monkeypatch.setattr(answer_pdf, "_Page", Kept)
+    monkeypatch.setattr(sheet, "_Page", Kept)
     answer, told, out = solve(str(staged)), StringIO(), tmp_path / "out"
     largest = [stage.gap.max() for stage in answer.stages]
     limit = (largest[1] + largest[2]) / 2
@@ -127,9 +127,9 @@ def test_the_history_is_in_all_that_solve_writes(
     for text in (told.getvalue(), page):
         assert "| release |" in text.replace("│", "|")
     assert "gap of clamp" in (out / "index.html").read_text()
-    (sheet,) = sheets
-    assert sheet.at >= answer_pdf.LOWEST
-    assert any(text.get_text().startswith("release | ") for text in sheet.figure.texts)
+    (page_to_file,) = pages
+    assert page_to_file.at >= sheet.LOWEST
+    assert "release" in [text.get_text() for text in page_to_file.figure.texts]
     assert (out / "history.png").is_file()
     assert (out / "stage-gaps.png").is_file()
 

@@ -1,16 +1,21 @@
-"""The section through the largest gap, the view of the parts around it, and the page of PDF."""
+"""The section through the largest gap, the view of the parts around it, and the sheet."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from report.document.numbers import extent, position
+from report.document.blocks import Table, number, word
+from report.document.numbers import coordinate, extent, position, significant
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
-from report.writers.answer_pdf import LETTERS, write_pdf
+from report.writers import sheet
+from report.writers.sheet import LETTERS, exactness, origin, write_sheet
 
 X, Y = np.linspace(0.0, 60.0, 7), np.linspace(0.0, 20.0, 3)
 PAIRS = [{"pair": ["a", "b"], "start": 0, "stop": 21}, {"pair": ["b", "tool"], "start": 21, "stop": 42}]
@@ -96,29 +101,69 @@ def test_what_has_no_area_is_not_drawn() -> None:
     assert deformed_figure({"m": 0, "pairs": []}, {}) is None
 
 
-@pytest.mark.parametrize("count", [0, 3, 400])
-def test_the_page_to_file_is_one_page(tmp_path: Path, count: int) -> None:
+@pytest.mark.parametrize("count", [0, 1, 24, 400])
+def test_the_sheet_is_one_page_that_prints_on_a4_and_letter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    """Nothing is cut, no text covers another, and each fastener is on it or said to be in a file."""
+    pages: list[Any] = []
+    monkeypatch.setattr(sheet._Page, "__init__", keeping(pages, sheet._Page.__init__))
     record, arrays = answer(8)
-    forces = [
-        {"kind": "fasteners", "pair": ["a", "b"], "x": k, "y": 2.0, "force_N": 9.0} for k in range(count)
-    ]
-    record |= {"title": "A $joint_ of " + LETTERS * "two ", "scene": "here", "scene_key": "0" * 64, "n": 42}
-    record |= {"method": "newton", "fasteners": forces, "grid": {"said": "Nothing is known"}, "steps": {}}
-    check = {"exceeded": True, "allowed_mm": 0.05, "contacts": [1], "share": 0.02, "pairs": ["a – b"]}
-    record |= {"unusual": ["E is unusual"], "recorded_at": "2026-01-02T03:04:05"}
-    arrays |= {"nodes": arrays["contact_nodes"]}
-    record |= {"allowed_gap": check, "commit": "c0ffee"}
     figure = section_figure(record, arrays)
     assert figure is not None
     figure.savefig(tmp_path / "section.png")
-    write_pdf(tmp_path / "answer.pdf", record, arrays, [tmp_path / "section.png"])
-    content = (tmp_path / "answer.pdf").read_bytes()
-    assert content.startswith(b"%PDF")
-    assert len(re.findall(rb"/Type /Page\b", content)) == 1
+    forces = pd.DataFrame(
+        [("pin", k + 0.25, 2.0, 9.0 + k) for k in range(count)], columns=["kind", "x", "y", "N"]
+    )
+    columns = [word("fastener", "kind"), number("x, mm", "x", coordinate), number("y, mm", "y", coordinate)]
+    table = Table("fasteners", "*The force in each fastener.*", forces, [*columns, number("force, N", "N")])
+    content = sheet.Sheet(
+        "A $joint_ of " + LETTERS * "two ",
+        "fail",
+        "FAIL: limit 0.05 mm",
+        [exactness(2e-16)],
+        origin({"scene": "here", "commit": "c0ffee", "recorded_at": "2026-01-02T03:04:05"}),
+        {"scan.csv": "0123456789abcdef" * 4},
+        [tmp_path / "section.png"],
+        [table],
+        ["E is unusual"],
+    )
+    write_sheet(tmp_path / "sheet.pdf", content)
+    data = (tmp_path / "sheet.pdf").read_bytes()
+    assert data.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type /Page\b", data)) == 1
+    (page,) = pages
+    assert page.figure.get_size_inches() * 25.4 == pytest.approx((210, 279))
+    renderer = FigureCanvasAgg(page.figure).get_renderer()
+    boxes = [text.get_window_extent(renderer) for text in page.figure.texts]
+    boxes += [axes.get_window_extent(renderer) for axes in page.figure.axes]
+    width, height = page.figure.get_size_inches() * page.figure.dpi
+    assert all(0 < box.x0 < box.x1 < width and 0 < box.y0 < box.y1 < height for box in boxes)
+    for k, first in enumerate(boxes):
+        assert not any(first.padded(-1.0).overlaps(second.padded(-1.0)) for second in boxes[k + 1 :])
+    texts = [text.get_text() for text in page.figure.texts]
+    whole = " ".join(texts)
+    for said in ("exact to 0.000001 mm", "scan.csv, SHA-256 0123456789ab.", "2026-01-02 03:04 UTC"):
+        assert said in whole
+    left = int(more[1]) if (more := re.search(r"(\d+) more: fasteners.csv", whole)) else 0
+    assert (left > 0) == (count > 24)
+    assert sum(text in {significant(9.0 + k) for k in range(count)} for text in texts) == count - left
+    assert ("y, mm: 2" in whole) == (count > 1)  # where all are the same
+
+
+def keeping(pages: list[Any], begin: Callable[[Any], None]) -> Callable[[Any], None]:
+    """The constructor of a page, which is put into the list."""
+
+    def made(page: Any) -> None:
+        begin(page)
+        pages.append(page)
+
+    return made
 
 
 def test_places_are_rounded_by_the_size_of_the_part_and_a_gap_of_rounding_is_zero() -> None:
     nodes = np.array([[1077.93456, -1e-9], [0.0, 4000.0]])
+    assert coordinate(nodes[0, 0]) == "1077.93"
     assert position(nodes[0], nodes) == "(1077.93, 0) mm"
     assert position(nodes[0] / 1e3, nodes / 1e3) == "(1.0779, 0) mm"
     assert extent(np.array([-1.1e-16, 0.73])) == "0 … 0.730"
