@@ -32,6 +32,8 @@ from harness.scene.stages import StageAnswer
 from harness.scene.stress import Stresses
 from harness.series.load_case_source import GapCases
 from harness.series.session import SeriesOptions
+from harness.shimming import run as shimming
+from harness.shimming.run import Shimming
 from harness.solving.call_lock import in_turn
 from harness.terminal.console import ConsoleReporter
 from harness.verification import gate as gates
@@ -63,6 +65,7 @@ __all__ = [
     "SeriesOptions",
     "SeriesOutcome",
     "Settings",
+    "Shimming",
     "Solution",
     "Solver",
     "StageAnswer",
@@ -81,6 +84,7 @@ __all__ = [
     "report",
     "run",
     "run_series",
+    "shim",
     "solve",
     "solve_dual",
     "solve_series",
@@ -101,6 +105,7 @@ random_gaps = in_turn(random_fields.random_gaps)
 report = in_turn(suite_runs.report)
 run = in_turn(suite_runs.run)
 run_series = in_turn(load_case_series.run_series)
+shim = in_turn(shimming.shim)
 solve = in_turn(solution.solve)
 solve_dual = in_turn(plain_arrays.solve_dual)
 solve_series = in_turn(plain_arrays.solve_series)

@@ -163,7 +163,7 @@ def place(
     share = share if share is not None else 1.0 if study.cases.count == 1 else 0.95
     goal = Goal(allow_gap_mm, share, count)
     order = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
-    law = _other_gaps(study.bare, study.cases)
+    law = other_gaps(study.bare, study.cases)
     text_of = partial(_scene_text, source, directory, law)
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
@@ -238,7 +238,7 @@ def _written_scene(
     return scene, cases
 
 
-def _other_gaps(bare: JointScene, cases: LoadCases) -> RandomGaps | None:
+def other_gaps(bare: JointScene, cases: LoadCases) -> RandomGaps | None:
     """The random gaps of the cases, unless the scene's file has the same."""
     if not isinstance(cases, RandomGaps):
         return None

@@ -26,7 +26,7 @@ from harness.verification.reference import proof_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms import Form
-from problems.forms.assembly import DualLoadCase, Vector
+from problems.forms.assembly import Assembly, DualLoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
 from problems.model.effect import Effect
 from problems.model.scene import JointScene
@@ -51,7 +51,9 @@ class Study(ABC):
     def effect(self, item: Place) -> Effect:
         """What an item adds to the scene."""
 
-    def further(self, gap: Vector, x: Callable[[], Vector], error_mm: float) -> tuple[float, ...]:
+    def further(
+        self, assembly: Assembly, gap: Vector, x: Callable[[], Vector], error_mm: float
+    ) -> tuple[float, ...]:
         """More figures of a case, from its gaps (m,) mm, no less than they can be, and x (n,) ± error_mm."""
         return ()
 
@@ -109,6 +111,11 @@ class PlanSession:
         starts = [] if question.base is None else self.starts(question.base, question.cases)
         return [self._outcome(self._loads(plan, question.cases), starts) for plan in question.plans]
 
+    def gaps(self, numbers: Sequence[int]) -> Matrix:
+        """An estimate of the gaps (m, k) that no item leaves in some cases, mm."""
+        cases = self.sweeps.together(self._loads((), numbers), ESTIMATE_MM)
+        return np.column_stack([self.sweeps.vectors(case)[1] for case in cases])
+
     def _outcome(self, loads: list[DualLoadCase], starts: list[Case]) -> Outcome:
         """starts : one for each case of an estimate; none: it is proven."""
         if starts:
@@ -122,7 +129,9 @@ class PlanSession:
             gaps, bounds = np.column_stack([a.gap for a in answers]), [a.bound_mm for a in answers]
         largest = gaps.max(axis=0) + errors
         mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
-        further = tuple(filter(None, map(self.study.further, (gaps + errors).T, xs, bounds)))
+        further = tuple(
+            filter(None, map(partial(self.study.further, self.data.assembly), (gaps + errors).T, xs, bounds))
+        )
         at = gaps.argmax(axis=0)
         return Outcome(tuple(largest.tolist()), tuple(at.tolist()), tuple(mean.tolist()), further)
 

@@ -1,0 +1,84 @@
+"""The command `shim`: what goes between the parts."""
+
+import signal
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import options
+from .options import error_reporting, option
+
+CSV = "x_min, x_max, y_min, y_max in mm, perhaps name"
+
+
+def shim(
+    scene: options.SceneName,
+    out: Annotated[Path, option("DIR", "Output directory.")],
+    allow_gap: Annotated[float, option("MM", "The largest gap allowed after fastening.")],
+    stock: Annotated[str, option("MM", "Thicknesses: 0.2,0.3,0.5, or FIRST:LAST:STEP, as 0.05:1.0:0.05.")],
+    patches: Annotated[
+        str | None, option("PATCHES", f"Columns x rows, as 8x1, or a CSV with {CSV}.  [default: 16 cells]")
+    ] = None,
+    allow_force: Annotated[float | None, option("N", "The largest force allowed in a fastener.")] = None,
+    allow_stress: Annotated[
+        float | None, option("MPA", "The largest von Mises stress allowed, N/mm².")
+    ] = None,
+    share: Annotated[
+        float | None, option("SHARE", "Of the cases that must keep all limits.  [default: 0.95; of one, 1]")
+    ] = None,
+    cases: options.Cases = None,
+    seed: options.Seed = None,
+    mean: options.Mean = None,
+    sd: options.Spread = None,
+    correlation_length: options.Length = None,
+    around: options.Around = None,
+    gaps: options.Gaps = None,
+    scans: options.Scans = None,
+    variance: options.Variance = None,
+    columns: options.Columns = None,
+    missing: options.Missing = None,
+    scheduler: options.Scheduler = None,
+) -> None:
+    """Find the fewest shims from a stock, then the least, that keep a gap after fastening.
+
+    The load cases are random or measured gaps, as of `series`; a scene without random gaps is one case. For
+    many, one set of shims is found, and fresh cases say in what share of all it keeps the limits; each gap is
+    proven. DIR has the scene with shims (shimmed.toml), their table and drawing (shims.csv, shims.png), and a
+    report. Stop with Ctrl-C, run the same command again, and it continues.
+
+    \b
+    Examples:
+      python -m harness shim joint.toml --allow-gap 0.1 --stock 0.2,0.3,0.5 --patches 8x1 --out results/shims
+      python -m harness shim joint.toml --allow-gap 0.1 --stock 0.05:1.0:0.05 --gaps g.csv --out results/many
+
+    \b
+    Exit codes: 0 found, 2 wrong usage or bad input, 4 no shims are shown to keep the limits, 130 interrupted.
+    """
+    with error_reporting(
+        interrupted="Interrupted. What was tried is kept: run the same command again."
+    ) as console:
+        from harness.series.load_case_source import GapCases
+        from harness.shimming.run import shim as find_shims
+        from harness.terminal import DONE, GAP_EXCEEDED
+        from harness.terminal.console import ConsoleReporter
+
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        read_by = options.table_options(columns, missing)
+        sources = around, gaps, read_by, (), None, scans, variance
+        shims = find_shims(
+            scene,
+            out,
+            allow_gap_mm=allow_gap,
+            stock=stock,
+            patches=patches,
+            allow_force=allow_force,
+            allow_stress=allow_stress,
+            share=share,
+            cases=GapCases(cases, seed, mean, sd, correlation_length, *sources),
+            scheduler=scheduler,
+            reporter=ConsoleReporter(console, plain=True),
+        )
+        console.print(f"Report: {shims.report}")
+        console.print(shims.sentence, style="green" if shims.passed else "red", soft_wrap=True)
+        raise typer.Exit(DONE if shims.passed else GAP_EXCEEDED)

@@ -1,0 +1,1 @@
+"""Which shims close what fastening leaves open: patches, the search for thicknesses, what is written."""

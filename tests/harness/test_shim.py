@@ -1,0 +1,235 @@
+"""Which shims close the gap: plans against other answers and full enumeration; refused, resumed, drawn."""
+
+import json
+from dataclasses import replace
+from itertools import product
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from commands import harness
+from small_joints import FASTENERS, GAP, two_parts
+
+from harness import solve
+from harness.placement.answer_journal import AnswerJournal
+from harness.placement.session import PlanSession, Question
+from harness.scene.fastener_forces import fastener_forces
+from harness.shimming.patches import patches_of, stock_of
+from harness.shimming.search import ShimSearch, ShimStudy
+from problems.build import load_case
+from problems.effects.shims import Shims
+from problems.errors import InputError
+from problems.load_cases import Listed
+from problems.scene_files import read_scene
+
+RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
+STOCK = (0.02, 0.04, 0.08)
+
+
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("shim") / "strip.toml"
+    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS + RIVET)
+    return path
+
+
+def session_of(path: Path, patches: str, limits: tuple[float, float] = (inf, inf)) -> PlanSession:
+    scene = read_scene(str(path))
+    cases = Listed((load_case(scene),))
+    return PlanSession(ShimStudy(scene, cases, "dual", patches_of(scene.joint, patches), limits))
+
+
+def shim(path: Path, out: Path, *words: object) -> Any:
+    stock = ("--allow-gap", 0.08, "--stock", "0.02,0.04,0.08", "--patches", "4x1")
+    return harness("shim", path, *stock, "--out", out, *words)
+
+
+def record_of(directory: Path) -> dict[str, Any]:
+    return dict(json.loads((directory / "shim.json").read_text()))
+
+
+def test_a_plan_leaves_what_a_scene_with_its_shims_leaves(strip: Path) -> None:
+    """Gaps and the largest force, against `solve` on the scene with the effects."""
+    session = session_of(strip, "4x2", (1e6, inf))
+    plan = ((0, 0.02), (5, 0.04))
+    (outcome,) = session.answer(Question((plan,), (0,)))
+    _, estimated = session.answer(Question(((), plan), (0,), base=()))
+    scene = session.study.bare
+    answer = solve(replace(scene, effects=(*scene.effects, *map(session.study.effect, plan))))
+    assert answer.gap.max() <= outcome.largest[0] <= answer.gap.max() + 1e-7
+    force = max(abs(one["force_N"]) for one in fastener_forces(scene, answer.x))
+    assert outcome.further[0][-2] == pytest.approx(force, rel=1e-9)
+    np.testing.assert_allclose(estimated.further, outcome.further, rtol=1e-3)
+    (areas,) = (study.areas for study in [session.study] if isinstance(study, ShimStudy))
+    assert sum(outcome.further[0][9:18]) == pytest.approx(np.maximum(answer.gap, 0) @ areas, rel=1e-6)
+    assert areas.sum() == pytest.approx(200.0 * 50.0)
+
+
+def test_a_shim_over_all_contacts_is_a_smaller_gap(strip: Path) -> None:
+    """To the last bit, at thicknesses that binary numbers hold."""
+    scene = read_scene(str(strip))
+    gap = next(effect for effect in scene.effects if effect.kind == "initial_gap")  # type: ignore[attr-defined]
+    flat = [gap.model_copy(update={"mean": mean, "random": None}) for mean in (0.5, 0.25)]
+    rest = [effect for effect in scene.effects if effect is not gap]  # type: ignore[attr-defined]
+    sheet = Shims(kind="shims", thickness=0.25, x=(0.0, 200.0), y=(0.0, 50.0))
+    shimmed, smaller = (replace(scene, effects=(*rest, *some)) for some in ([flat[0], sheet], [flat[1]]))
+    assert load_case(shimmed).g.tobytes() == load_case(smaller).g.tobytes()
+    assert solve(shimmed).gap.tobytes() == solve(smaller).gap.tobytes()
+
+
+@pytest.mark.parametrize(("patches", "share"), [("4x1", 0.7), ("2x2", 0.35)])
+def test_the_least_of_all_plans_is_found(strip: Path, patches: str, share: float) -> None:
+    """Against all 4⁴ plans of four patches and three thicknesses; the limit is a share of the gap without."""
+    session = session_of(strip, patches)
+    plans = [tuple((k, t) for k, t in enumerate(plan) if t) for plan in product((0.0, *STOCK), repeat=4)]
+    loads = [session._loads(plan, (0,))[0] for plan in plans]
+    cases = session.sweeps.together(loads, 1e-9)
+    gaps = {p: session.sweeps.vectors(case)[1].max() for p, case in zip(plans, cases, strict=True)}
+    study = session.study
+    assert isinstance(study, ShimStudy)
+    limit = share * gaps[()]
+    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, limit, study, STOCK)
+    kept = [plan for plan, gap in gaps.items() if gap <= limit]
+    _, best = search.once(())
+    assert 0 < len(kept) < len(plans)
+    assert best.gap_mm <= limit
+    assert search.cost(best.plan) == min(map(search.cost, kept))
+
+
+def test_a_force_counts_as_a_gap_with_the_same_share_of_its_limit(strip: Path) -> None:
+    session = session_of(strip, "4x1", (100.0, inf))
+    study = session.study
+    assert isinstance(study, ShimStudy)
+    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, 1.0, study, STOCK)
+    (outcome,) = search.outcomes([()], [0], 50)
+    assert outcome.largest[0] == max(*outcome.further[0][:5], outcome.further[0][-2] / 100.0)
+    assert outcome.further[0][-2] >= 40.0  # a fastener's preload
+
+
+def test_each_contact_is_in_one_patch(tmp_path: Path) -> None:
+    """Nodes on borders of cells, and of rectangles of a CSV that touch."""
+    path = tmp_path / "joint.toml"
+    path.write_text(two_parts(length=200.0, nodes=(21, 5)) + FASTENERS)
+    joint = read_scene(str(path)).joint  # type: ignore[attr-defined]
+    csv = tmp_path / "patches.csv"
+    csv.write_text("name,x_min,x_max,y_min,y_max\nleft,0,100,0,50\nright,100,200,0,25\n")
+    for source, areas, missed in (("4x2", [1250.0] * 8, 0), (str(csv), [5000.0, 2500.0], 20)):
+        patches = patches_of(joint, source)
+        inside = np.sum([patch.shim.gap(joint) < 0 for patch in patches], axis=0)
+        assert inside.max() == 1
+        assert (inside == 0).sum() == missed
+        assert [patch.area for patch in patches] == areas
+    assert [patch.name for patch in patches] == ["left", "right"]
+    assert len(patches_of(joint, None)) == 16
+
+
+def test_stocks_are_lists_or_steps() -> None:
+    assert stock_of("0.2,0.3,0.5") == (0.2, 0.3, 0.5)
+    assert stock_of("0.05:0.2:0.05") == (0.05, 0.1, 0.15, 0.2)
+    for text in (
+        "",
+        "0",
+        "-0.1,0.2",
+        "0.3,0.2",
+        "0.2,0.2",
+        "nan",
+        "0.1:0.5",
+        "0.1:0.5:0",
+        "0.5:0.1:0.1",
+        "x",
+    ):
+        with pytest.raises(InputError, match="ascending"):
+            stock_of(text)
+
+
+def test_the_command_finds_shims_that_solve_confirms(strip: Path, tmp_path: Path) -> None:
+    done = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1)
+    assert done.exit_code == 0, done.output
+    record, table = record_of(tmp_path / "out"), pd.read_csv(tmp_path / "out" / "shims.csv")
+    assert "PASS: " in done.output
+    assert "in all 2 fresh cases (95 % interval" in done.output
+    assert record["after"]["gap"] <= 0.08 < record["before"]["gap"]
+    assert (table["gap_after_mm"] <= 0.08).all()
+    effects = read_scene(str(tmp_path / "out" / "shimmed.toml")).effects  # type: ignore[attr-defined]
+    cut = [(effect.x[1], effect.thickness) for effect in effects if effect.kind == "shims"]
+    assert cut == [
+        tuple(line) for line in table.query("thickness_mm > 0")[["x_max", "thickness_mm"]].to_numpy()
+    ]
+    for name in ("report.md", "shims.png", "forces.csv"):
+        assert (tmp_path / "out" / name).is_file()
+    # The same command again finds all answers; another search is refused.
+    answers = (tmp_path / "out" / "shims.jsonl").read_text()
+    assert shim(strip, tmp_path / "out", "--cases", 2, "--share", 1).exit_code == 0
+    assert (tmp_path / "out" / "shims.jsonl").read_text() == answers
+    other = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1, "--allow-force", 500)
+    assert other.exit_code == 2
+    assert "allow_force" in other.output
+
+
+def test_solve_says_the_same_of_one_joint(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whose gap is as given, after an interruption."""
+    path, keep, kept = tmp_path / "flat.toml", AnswerJournal._keep, [0]
+    path.write_text(
+        strip.read_text().replace("random = {", "# random = {").replace("mean = 0.05", "mean = 0.2")
+    )
+
+    def interrupted(self: AnswerJournal, *answer: Any) -> None:
+        keep(self, *answer)
+        kept[0] += 1
+        if kept[0] == 3:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(AnswerJournal, "_keep", interrupted)
+        assert shim(path, tmp_path / "out").exit_code == 130
+    done = shim(path, tmp_path / "out")
+    assert done.exit_code in (0, 4)
+    record = record_of(tmp_path / "out")
+    largest = solve(str(tmp_path / "out" / "shimmed.toml")).gap.max()
+    assert f"{record['after']['gap']:.9f}" == f"{largest:.9f}"
+    assert (done.exit_code == 0) == (largest <= 0.08)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--stock", "0.3,0.2", "--allow-force", 0), ["--stock", "ascending", "allow_force", "above 0"]),
+        (("--patches", "0x4"), ["--patches", "columns x rows"]),
+        (
+            ("--patches", "patches.csv"),
+            ["line 2", "on the junction", "line 3", "overlaps line 2", "x_min < x_max"],
+        ),
+        (("--allow-gap", -1), ["limit_mm", "above 0"]),
+        (("--share", 2), ["share", "at most 1"]),
+        (("--cases", 10), ["--share", "take 59"]),
+    ],
+)
+def test_wrong_questions_are_refused(strip: Path, tmp_path: Path, words: Any, said: list[str]) -> None:
+    (tmp_path / "patches.csv").write_text("x_min,x_max,y_min,y_max\n-5,100,0,50\n50,150,0,50\n9,9,0,1\n")
+    words = [tmp_path / word if word == "patches.csv" else word for word in words]
+    done = shim(strip, tmp_path / "out", *words)
+    assert done.exit_code == 2
+    for text in said:
+        assert text in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scene_without_fasteners_or_with_stages_is_refused(strip: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare.toml"
+    bare.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.1\n[[stage]]\nname = "one"\n')
+    done = shim(bare, tmp_path / "out")
+    assert done.exit_code == 2
+    for text in ("no fasteners", "stage"):
+        assert text in done.output
+
+
+def test_a_stock_that_is_too_thin_says_where(strip: Path, tmp_path: Path) -> None:
+    done = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1, "--mean", 2.0)
+    assert done.exit_code == 4
+    for text in ("FAIL: no shims of the stock", "in patch"):
+        assert text in done.output
