@@ -66,7 +66,7 @@ class RandomInputs(LoadCases):
     @property
     def facts(self) -> dict[str, Any]:  # type: ignore[override]
         names = [one.name for one in self.inputs] + ["initial_gap.random"] * bool(self.gaps)
-        return {"inputs": names, "cases_per_point": len(names) + 2 if self.contributors else 1}
+        return {"random_inputs": names, "cases_per_point": len(names) + 2 if self.contributors else 1}
 
     def draws(self, k: int) -> list[int]:
         """The draw of each input in case k, the field last."""

@@ -29,7 +29,7 @@ def indices(series: Series) -> pd.DataFrame:
         return pd.DataFrame()
     y = cases["max_gap_mm"].to_numpy()
     f = y.reshape(-1, 1, per_point).T * (np.ptp(y) > 2 * cases["gap_error_mm"].max())
-    N, random, table = f.shape[-1], np.random.default_rng(0), pd.DataFrame({"input": facts["inputs"]})
+    N, random, table = f.shape[-1], np.random.default_rng(0), pd.DataFrame({"input": facts["random_inputs"]})
     picked = (random.integers(N, size=N) if k else np.arange(N) for k in range(RESAMPLES + 1))
     parts = ({"f_A": f[0][:, i], "f_B": f[1][:, i], "f_AB": f[2:, :, i]} for i in picked)
     made = (sobol_indices(func=part, n=N) for part in parts)

@@ -86,7 +86,7 @@ def read(directory: Path) -> Series:
         verdicts[case], rows[case] = row["verdict"], None
         code[case] = row.get("commit") or "", row.get("clean")
         if row.get("max_gap_mm") is not None:
-            swept = swept or [key for key in row if "." in key and not facts.get("inputs")]
+            swept = swept or [key for key in row if "." in key and not facts.get("random_inputs")]
             rows[case] = (case, *(row.get(name) for name in FIGURES), *(row[key] for key in swept))
     kept = [row for row in rows.values() if row]
     swept = quoted(swept)

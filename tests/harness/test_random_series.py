@@ -81,3 +81,10 @@ def test_random_keys_do_not_go_through_stages(scene: Path, tmp_path: Path) -> No
     done = harness("series", scene, "--out", tmp_path / "out")
     assert done.exit_code == 2
     assert "has stages" in done.output
+
+
+def test_a_sweep_leaves_the_table_out(scene: Path, tmp_path: Path) -> None:
+    done = harness("series", scene, "--sweep", "initial_gap.mean=0.2,0.4", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert not any("fasteners.preload" in row for row in rows_of(tmp_path / "out"))
+    assert (tmp_path / "out/report/sweep-initial_gap.mean.csv").exists()
