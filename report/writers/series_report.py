@@ -15,7 +15,7 @@ from report.figures import style
 from report.figures.contributors import bars, indices
 from report.figures.junction_maps import Map, drawn, larger_than, rooted
 from report.page.contact_maps import hover_names, map_controls, series_maps
-from report.page.page_figures import exceedance_figure, item, map_item
+from report.page.page_figures import exceedance_figure, items, map_item
 from report.page.page_file import Data, banner
 from report.page.page_file import write as write_page
 from report.results.series_results import (
@@ -235,6 +235,6 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
         "maps": maps,
         "figures": {
             "map": map_item(hover_names(maps)),
-            "curves": item(exceedance_figure(curves), "curves"),
+            "curves": items(exceedance_figure(curves), ["curves"])[0],
         },
     }
