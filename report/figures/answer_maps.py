@@ -24,10 +24,10 @@ from .junction_maps import (
     Outlines,
     Scale,
     drawn,
-    grid_of,
     larger_than,
     rooted,
 )
+from .node_cells import grid_of
 
 #: Colour and marker of the force in each kind of fastener over the stages.
 LINES = [

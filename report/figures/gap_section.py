@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from report.document.numbers import significant
 
 from . import style
-from .junction_maps import Array, grid_of
+from .node_cells import Array, grid_of
 
 PLACE = {"left": 0.085, "right": 0.99, "bottom": 0.28, "top": 0.91, "wspace": 0.04}  # of the figure
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
@@ -22,9 +22,8 @@ from report.document.escape import LONGEST_LABEL
 from report.document.verdict_colours import FAIL
 
 from . import style
+from .node_cells import Array, border, cell_edges, cells_of, grid_of
 
-Array = NDArray[np.float64]
-Grid = tuple[Array, Array, NDArray[np.intp]]
 Outlines = Sequence[tuple[NDArray[np.bool_], str, str]]  # a mask, its colour, its name in the legend
 Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
 
@@ -32,7 +31,6 @@ Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
 SHAPES = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 MANY = 60
 MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", FAIL, "#444444"
-DOTS, DOT, RING = 4000.0, (4.0, 40.0), 8.0  # points² of all dots of a map, of one; points of a ring around it
 THINNEST = 0.02  # a map's shorter side over its longer one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
 # inches
@@ -110,24 +108,15 @@ def drawn(maps: Sequence[Map], beside: int, corners: Array | None = None) -> tup
     return sheet, panels
 
 
-def grid_of(nodes: Array) -> Grid | None:
-    """x, y and the place of each node if the nodes are a full tensor grid, else None."""
-    x, column = np.unique(np.round(nodes[:, 0], 6), return_inverse=True)
-    y, row = np.unique(np.round(nodes[:, 1], 6), return_inverse=True)
-    place = row * len(x) + column
-    full = len(place) == len(x) * len(y) == len(np.unique(place)) and len(x) > 1 and len(y) > 1
-    return (x, y, place) if full else None
-
-
 def _field(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappable:
-    """Draw a field on the nodes: as cells if they are a grid, otherwise as dots."""
+    """Draw a field on the nodes, each in its cell."""
     axes.set(aspect="equal", ylabel="y, mm")
     axes.grid(visible=False)
     look: dict[str, Any] = {"norm": scale.norm, "cmap": scale.colours}
-    grid = grid_of(nodes)
-    if grid is None:
-        size = float(np.clip(DOTS / max(len(nodes), 1), *DOT))
-        return axes.scatter(nodes[:, 0], nodes[:, 1], c=values, s=size, **look)
+    if (grid := grid_of(nodes)) is None:
+        drawn = PolyCollection(cells_of(nodes), array=values, edgecolors="face", linewidths=0.3, **look)
+        axes.add_collection(drawn)
+        return drawn
     x, y, place = grid
     cells = np.empty(len(x) * len(y))
     cells[place] = values
@@ -135,19 +124,13 @@ def _field(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappa
 
 
 def _outlined(axes: Axes, nodes: Array, inside: NDArray[np.bool_], colour: str, label: str) -> None:
-    """Draw the border of some contacts, or a ring around each off a grid, dark-rimmed on any colour."""
+    """Draw the border of some contacts, dark-rimmed on any colour."""
     if not inside.any():
         return
-    grid = grid_of(nodes)
-    look: dict[str, Any] = (
-        {} if colour == RIM else {"path_effects": [withStroke(linewidth=1.7, foreground=RIM)]}
-    )
-    if grid is None:
-        look |= {"marker": "o", "markersize": RING, "linestyle": "", "markerfacecolor": "none"}
-        axes.plot(*nodes[inside].T, markeredgecolor=colour, markeredgewidth=0.9, label=label, **look)
-    else:
-        axes.add_collection(LineCollection(outline(grid, inside), color=colour, linewidth=0.9, **look))
-        axes.plot([], [], color=colour, label=label, linewidth=0.9, **look)
+    look: dict[str, Any] = {"color": colour, "linewidth": 0.9}
+    look |= {} if colour == RIM else {"path_effects": [withStroke(linewidth=1.7, foreground=RIM)]}
+    axes.add_collection(LineCollection(list(border(cells_of(nodes), inside)), **look))
+    axes.plot([], [], label=label, **look)
 
 
 def _marked(axes: Axes, marks: Marks) -> None:
@@ -162,25 +145,6 @@ def _marked(axes: Axes, marks: Marks) -> None:
         axes.plot(x, y, label=kind.replace("_", " "), **look)
 
 
-def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
-    """The edges between the cells of closed contacts and the rest, as line segments."""
-    x, y, place = grid
-    cells = np.zeros(len(x) * len(y), dtype=bool)
-    cells[place] = inside
-    padded = np.pad(cells.reshape(len(y), len(x)), 1)
-    xe, ye = cell_edges(x), cell_edges(y)
-    rows, columns = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])
-    upright = [np.array([[xe[c], ye[r]], [xe[c], ye[r + 1]]]) for r, c in zip(rows, columns, strict=True)]
-    rows, columns = np.nonzero(padded[1:, 1:-1] != padded[:-1, 1:-1])
-    level = [np.array([[xe[c], ye[r]], [xe[c + 1], ye[r]]]) for r, c in zip(rows, columns, strict=True)]
-    return upright + level
-
-
-def cell_edges(nodes: Array) -> Array:
-    """The borders of the nodes' cells: half-way between the nodes, and the ends of the grid."""
-    return np.concatenate([nodes[:1], (nodes[1:] + nodes[:-1]) / 2, nodes[-1:]])
-
-
 def _sheet(
     middle: Array, size: Array, titles: list[str], columns: int, marks: int, bars: int
 ) -> tuple[Figure, list[Axes], list[Axes], int]:
@@ -189,7 +153,7 @@ def _sheet(
 
     middle, size : of the region, (x, y), mm. marks : the number of legend entries.
     """
-    rows, beside = -(-len(titles) // columns), bars * RIGHT
+    rows, beside = -(-len(titles) // columns), RIGHT * bool(bars)
     ratio = size[1] / size[0]
     room = (style.WIDTH - LEFT - beside - (columns - 1) * BESIDE) / columns
     width = min(room, TALLEST / ratio)
@@ -198,10 +162,10 @@ def _sheet(
     across, down = max(width + BESIDE, over), max(height, LOWEST) + BELOW  # from a map to the next
     wide = LEFT + (columns - 1) * across + max(width + beside, over)
     long = (rows - 1) * down + height
-    bar = max(long, SHORTEST)
-    top = TOP + (bar - long) / 2  # the maps in the middle of the bar
+    all_bars = max(long, bars * (SHORTEST + BELOW) - BELOW)
+    top = TOP + (all_bars - long) / 2  # the maps in the middle of the bars
     legend_columns = max(int(wide / ENTRY), 1)
-    tall = TOP + bar + BOTTOM + -(-marks // legend_columns) * LINE
+    tall = TOP + all_bars + BOTTOM + -(-marks // legend_columns) * LINE
     figure = Figure(figsize=(wide, tall))
 
     def placed(x: float, bottom: float, width: float, height: float) -> Axes:
@@ -223,6 +187,7 @@ def _sheet(
         axes.yaxis.label.set_visible(first)
         axes.xaxis.label.set_visible(last)
         maps.append(axes)
-    right = LEFT + (columns - 1) * across + width
-    places = [right + FROM_MAPS + k * RIGHT for k in range(bars)]
-    return figure, maps, [placed(x, tall - TOP - bar, BAR, bar) for x in places], legend_columns
+    right = LEFT + (columns - 1) * across + width + FROM_MAPS
+    bar = (all_bars + BELOW) / max(bars, 1) - BELOW
+    places = [placed(right, tall - TOP - bar - k * (bar + BELOW), BAR, bar) for k in range(bars)]
+    return figure, maps, places, legend_columns

@@ -111,10 +111,16 @@ def two_answers_data(answers: list[Answer]) -> Data:
 
 
 def _with_maps(records: list[Data], lines: list[list[str]], maps: Data) -> Data:
-    """The data of a page with gap maps and a table of facts."""
+    """The data of a page with gap maps and a table of facts; times and memory are folded away."""
+    times = [line for line in lines if line[0].endswith((", s", ", MiB"))]
+    tables = {"Facts": [line for line in lines if line not in times], "Time and memory": times}
     return {
         "banner": _banner(records),
-        "tables": [{"title": "Facts", "summary": "", "heads": [], "lines": lines}],
+        "tables": [
+            {"title": title, "summary": "", "heads": [], "lines": some, "folded": some is times}
+            for title, some in tables.items()
+            if some
+        ],
         "views": [("maps", "Gap maps")] if maps["maps"] else [],
         "controls": map_controls(maps),
         "maps": maps,

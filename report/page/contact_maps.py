@@ -2,15 +2,15 @@
 
 A map has `fields` by name; the `group` of its places, which maps on the same contacts share; and `marks`, the
 fasteners. A field has packed `values`, and a `kind` and a range for its colours. A group has packed arrays in
-mm: x, y, and left, right, bottom and top of each contact's cell.
+mm: x, y, and the corners of each contact's cell.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from report.document.numbers import counted, without_rounding
-from report.figures.junction_maps import cell_edges, grid_of
+from report.document.numbers import ROUNDING, counted
+from report.figures.node_cells import cells_of
 from report.page.page_file import Data, choice, entry, exact, packed
 from report.results.answer_record import pair_name, stress_map
 from report.results.reader import Results
@@ -48,7 +48,9 @@ def scene_maps(results: Results) -> Data:
 
 
 def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
-    """The maps of one answer, one per pair of parts in contact, and one of the stress in each part."""
+    """The maps of one answer, one per pair of parts in contact, and one of the stress in each part. What is
+    above the limits of gap and stress is outlined.
+    """
     fields = {text: arrays[name] for name, text in FIELDS.items()}
     gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
     page = _pairs(record, fields | {f"gap of {stage['name']}": gap for stage, gap in gaps}, arrays)
@@ -57,6 +59,15 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
         values, name = np.where(unread, np.nan, highest), f"stress of {part['name']}"
         if len(places):
             _added(page, name, places, {STRESS: values}, _marked(record), noun="place")
+    check, stress = record.get("allowed_gap") or {}, record.get("stress") or {}
+    return _limited(page, check.get("allowed_mm"), stress.get("allowed"))
+
+
+def _limited(page: Data, gap_mm: float | None, stress: float | None = None) -> Data:
+    """The page with the limits of its fields: above them contacts are outlined."""
+    for field in (field for made in page["maps"] for field in made["fields"].values()):
+        if field["kind"] == "gap":
+            field["limit"] = gap_mm if field["unit"] == "mm" else stress
     return page
 
 
@@ -112,7 +123,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
         made["fields"][f"case {case}{', the worst' if case == worst else ''}"] = field
     made["about"] += " A click on a contact shows how often its gap is exceeded."
     made |= {"shares": [100 * share for share in SHARES], "exceeded": curves}
-    return page
+    return _limited(page, (series.facts.get("allowed_gap") or {}).get("allowed_mm"))
 
 
 def _chosen(series: Series) -> Iterator[int]:
@@ -199,7 +210,8 @@ def _frame(nodes: Array) -> Data:
     low, high = low - margin, high + margin
     pixels = (high - low) * (LARGEST_MAP / (high - low)).min()
     return {
-        "frame": {"width": round(pixels[0]) + BESIDE_MAP, "height": round(pixels[1]) + BELOW_MAP},
+        "frame": {"width": round(pixels[0]), "height": round(pixels[1])},
+        "beside": {"width": BESIDE_MAP, "height": BELOW_MAP},
         "x_range": {"start": low[0], "end": high[0]},
         "y_range": {"start": low[1], "end": high[1]},
     }
@@ -210,11 +222,12 @@ def _field(name: str, values: Array) -> Data:
     most.
     """
     high = float(np.nanmax(values, initial=0.0)) or 1.0
+    values = np.where(abs(values) <= ROUNDING * high, 0.0, values)
     force = name == FIELDS["lam"]
     return {
         "kind": "force" if force else "gap",
         "unit": "N" if force else "N/mm²" if name == STRESS else "mm",
-        "low": 1e-4 * high if force else without_rounding(float(np.nanmin(values, initial=0.0)), high),
+        "low": 1e-4 * high if force else float(np.nanmin(values, initial=0.0)),
         "high": high,
         "hover": True,
         "values": packed(values),
@@ -222,19 +235,10 @@ def _field(name: str, values: Array) -> Data:
 
 
 def _cells(nodes: Array) -> dict[str, Array]:
-    """Places and sides of the contacts' cells, mm. Off a grid the cells are squares of the mean size."""
-    x, y = nodes.T
-    grid = grid_of(nodes)
-    if grid is None:
-        half = 0.5 * np.sqrt(max(np.ptp(x) * np.ptp(y), 1.0) / len(nodes))
-        return {"x": x, "y": y, "left": x - half, "right": x + half, "bottom": y - half, "top": y + half}
-    columns, rows, place = grid
-    row, column = np.divmod(place, len(columns))
-    across, up = cell_edges(columns), cell_edges(rows)
-    return {
-        **{"x": x, "left": across[column], "right": across[column + 1]},
-        **{"y": y, "bottom": up[row], "top": up[row + 1]},
-    }
+    """Places of the contacts, the corners of their cells one after another, mm, and how many each has."""
+    cells = cells_of(nodes)
+    (x, y), (xs, ys) = nodes.T, np.concatenate(cells).T
+    return {"x": x, "y": y, "xs": xs, "ys": ys, "corners": np.array([len(cell) for cell in cells])}
 
 
 def _size(fields: dict[str, Data]) -> int:

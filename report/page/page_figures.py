@@ -79,10 +79,10 @@ def map_figure(names: Iterable[str]) -> figure:
 
     plot = _figure("x, mm", "y, mm", x_range=(0, 1), y_range=(0, 1))
     palettes = {"gap": viridis(256), "force": magma(256)[::-1], "change": interp_palette(RdBu11, 256)}
-    sides = {side: side for side in ("left", "right", "bottom", "top")}
+    sides = {"xs": "xs", "ys": "ys"}
     outline: dict[str, Any] = {"fill_color": None, "line_color": "edge", "line_width": 1.5}
     empty: dict[str, list[float]] = {name: [] for name in ("x", "y", "value", "edge", *sides, *names)}
-    above = plot.quad(**sides, **outline, source=empty, name="above", level="annotation")
+    above = plot.patches(**sides, **outline, source=empty, name="above", level="annotation")
     above.nonselection_glyph = None
     for kind, palette in palettes.items():
         for scale, mapper in {"linear": LinearColorMapper, "log": LogColorMapper}.items():
@@ -91,7 +91,7 @@ def map_figure(names: Iterable[str]) -> figure:
                 colours.low_color = "white"  # where there is none
             look: dict[str, Any] = dict.fromkeys(("fill_color", "line_color"), transform("value", colours))
             name = f"{kind} {scale}"
-            cells = plot.quad(**sides, **look, source=above.data_source, name=name, visible=False)
+            cells = plot.patches(**sides, **look, source=above.data_source, name=name, visible=False)
             cells.nonselection_glyph = None
             plot.add_layout(ColorBar(color_mapper=colours, name=name, visible=False), "right")
     ring: dict[str, Any] = {"size": 7, "line_color": "#ffffff", "fill_color": "#111111"}
@@ -109,7 +109,14 @@ def exceedance_figure(curves: dict[str, tuple[Array, Array]]) -> figure:
     """
     from bokeh.models import HoverTool, PrintfTickFormatter
 
-    plot = _figure("gap t, mm", "share with more than t, %", width=760, height=320, y_axis_type="log")
+    plot = _figure(
+        "gap t, mm",
+        "share with more than t, %",
+        max_width=760,
+        height=320,
+        sizing_mode="stretch_width",
+        y_axis_type="log",
+    )
     for (name, (gap, share)), (colour, dash) in zip(curves.items(), CURVE_LOOKS, strict=True):
         shown = share > 0
         columns = {"x": gap[shown], "y": share[shown]}

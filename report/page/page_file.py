@@ -15,6 +15,7 @@ import pandas as pd
 
 from report.analysis.checks import commits_text
 from report.document.escape import plain, quoted, script_json, short
+from report.document.verdict_colours import FAIL, PASS
 from report.page.page_figures import scripts
 from report.results.series_results import Array
 
@@ -38,6 +39,8 @@ def write(path: Path, title: str, data: Data, directory: Path | None = None) -> 
     content = {
         **json.loads(script_json(static)),  # texts as they were: the template escapes them
         "title": heading,
+        "pass": PASS,
+        "fail": FAIL,
         "style": (HERE / "page.css").read_text("utf-8"),
         "data": script_json(scripted),
         "bokeh": scripts(),

@@ -49,6 +49,12 @@ function fillPanel(figure, cells) {
   figure.center.find(mark => mark.name === "bound").right = Math.max(...column(cells, "bound_mm"));
 }
 
+// The corners of each cell, of `counts` many.
+function split(corners, counts) {
+  let start = 0;
+  return Array.from(counts, count => corners.slice(start, start += count));
+}
+
 let drawing = 0;
 
 async function gapMap() {
@@ -60,14 +66,18 @@ async function gapMap() {
   const columns = Object.fromEntries(await Promise.all(
     Object.entries(packed).map(async ([column, text]) => [column, await unpacked(text)])));
   if (turn !== drawing) return; // another map is asked for by now
-  const above = at("threshold") === "" ? Infinity : Number(at("threshold"));
-  const edge = Array.from(columns.value, value => value > above ? "#E8112D" : "#00000000");
-  Object.assign(figure, map.frame);
+  for (const name of ["xs", "ys"]) columns[name] = split(columns[name], columns.corners);
+  const above = at("threshold") === "" ? field.limit ?? Infinity : Number(at("threshold"));
+  const fail = getComputedStyle(document.documentElement).getPropertyValue("--fail");
+  const edge = Array.from(columns.value, value => value > above ? fail : "#00000000");
+  const room = document.body.clientWidth - 40 - map.beside.width, scale = Math.min(1, room / map.frame.width);
+  for (const side of ["width", "height"]) figure[side] = map.beside[side] + Math.round(scale * map.frame[side]);
   Object.assign(figure.x_range, map.x_range);
   Object.assign(figure.y_range, map.y_range);
   sourceOf(figure, "above").data = {...columns, edge};
   sourceOf(figure, "marks").data = map.marks;
-  document.getElementById("about-map").textContent = `${map.name}: ${name}, ${field.unit}, at ${map.about}`;
+  document.getElementById("about-map").textContent = `${map.name}: ${name}, ${field.unit}, at ${map.about}`
+    + (above < Infinity ? ` Outlined: above ${above} ${field.unit}.` : "");
   colour(figure, field);
   if (map.exceeded && at("node")) exceedance(map, at("node"), columns);
 }

@@ -13,7 +13,7 @@ import pandas as pd
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.numbers import coordinate, extent, significant, whole
 from report.figures.answer_maps import answer_figures
-from report.figures.junction_maps import grid_of
+from report.figures.node_cells import grid_of
 from report.page.answer_page_data import answer_data, facts, headline
 from report.page.page_file import write as write_page
 from report.results.answer_record import (

@@ -21,7 +21,7 @@ from report.page.page_file import minute
 
 PAGE = (210 / 25.4, 279 / 25.4)  # inches
 LEFT, WIDTH, TOP, LINE, LOWEST = 0.07, 0.86, 0.96, 0.0145, 0.035  # of the page
-TALLEST, LEAST = 0.32, 0.16  # of a picture
+TALLEST, LEAST = 0.5, 0.16  # of a picture
 LETTERS, LETTER, GAP = 125, 0.0072, 0.03  # of a line; width of a letter, and between columns, of the page
 LEAST_LINES = 4  # of each table, before pictures shrink
 DIGITS = 12  # of a hash
@@ -51,8 +51,8 @@ class Sheet:
 def write_sheet(path: Path, sheet: Sheet) -> None:
     """Write one page; pictures shrink, and tables end earlier, where there is no room."""
     page = _Page()
-    page.text(sheet.title, size=13, weight="bold", letters=70)
-    page.text(sheet.verdict, size=11, weight="bold", color=COLOURS[sheet.kind], letters=85)
+    page.text(sheet.title, size=13, weight="bold", letters=66)
+    page.text(sheet.verdict, size=11, weight="bold", color=COLOURS[sheet.kind], letters=76)
     for sentence in sheet.warnings:
         page.text(f"{sentence}.", color=FAIL)
     files = [f"{name}, SHA-256 {digits[:DIGITS]}" for name, digits in sheet.inputs.items()]

@@ -15,7 +15,8 @@ from published_runs import DIRECTORIES
 from synthetic_results import SIZES, everything, no_answer, results, row, write_rows
 from synthetic_series import made as made_series
 
-from report.figures import style
+from problems.model.surface import surface_of
+from report.figures import node_cells, style
 from report.page import answer_page_data, contact_maps, run_page_data
 from report.page.page_file import packed, write
 from report.page.run_page_data import run_data
@@ -198,12 +199,42 @@ def test_of_many_contacts_every_kth_is_in_the_page(tmp_path: Path, monkeypatch: 
 
 def test_the_cells_of_a_map_meet_half_way_between_the_contacts() -> None:
     nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 40.0)])
-    cells = contact_maps._cells(nodes)
-    np.testing.assert_array_equal(cells["left"][:3], [0.0, 5.0, 25.0])
-    np.testing.assert_array_equal(cells["right"][:3], [5.0, 25.0, 40.0])
-    np.testing.assert_array_equal(cells["top"][::3], [5.0, 10.0])
-    off_grid = contact_maps._cells(nodes[:5])
-    np.testing.assert_allclose(off_grid["right"] - off_grid["left"], np.sqrt(400 / 5))
+    assert node_cells.cells_of(nodes)[1].tolist() == [[5, 0], [25, 0], [25, 5], [5, 5]]
+    packed_cells = contact_maps._cells(nodes)
+    assert packed_cells["corners"].tolist() == [4] * 6
+    assert packed_cells["xs"][4:8].tolist() == [5, 25, 25, 5]
+
+
+def area(cell: np.ndarray) -> float:
+    (x, y), (after, above) = cell.T, np.roll(cell, -1, axis=0).T
+    return float(x @ above - y @ after) / 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_cells_of_scattered_contacts_are_a_third_of_their_triangles(seed: int) -> None:
+    """They turn anticlockwise, share all their sides, and leave a hole open."""
+    random = np.random.default_rng(seed)
+    X, Y = np.meshgrid(np.arange(12.0), np.arange(9.0))
+    nodes = np.column_stack([X.ravel(), Y.ravel()]) + random.uniform(-0.2, 0.2, (108, 2))
+    nodes = nodes[np.linalg.norm(nodes - [6, 4], axis=1) > 2]
+    triangles = surface_of(nodes).triangles
+    corners = nodes[triangles]
+    sizes = np.array([area(corner) for corner in corners])
+    expected = np.bincount(triangles.ravel(), np.repeat(sizes / 3, 3), minlength=len(nodes))
+    cells = node_cells.cells_of(nodes)
+    np.testing.assert_allclose([area(cell) for cell in cells], expected, rtol=1e-9)
+    rim = node_cells.border(cells, np.ones(len(nodes), dtype=bool))
+    edges = np.concatenate([corners[:, [k, (k + 1) % 3]] for k in range(3)])
+    alone = [edge for edge in edges if not (edges == edge[::-1]).all(axis=(1, 2)).any()]
+    length = sum(np.linalg.norm(end - start) for start, end in alone)
+    assert np.linalg.norm(rim[:, 1] - rim[:, 0], axis=1).sum() == pytest.approx(length)
+
+
+def test_contacts_on_a_line_or_in_one_place_have_cells() -> None:
+    assert [area(cell) for cell in node_cells.cells_of(np.array([[0.0, 5], [3, 5], [9, 5]]))] == [9.0] * 3
+    twice = np.array([[0.0, 0], [4, 0], [1, 3], [4, 0]])
+    cells = node_cells.cells_of(twice)
+    assert [area(cell) for cell in cells] == pytest.approx([2.0] * 4)
 
 
 def test_every_marker_of_the_report_has_one_on_the_page() -> None:

@@ -120,7 +120,7 @@ def test_the_sheet_is_one_page_that_prints_on_a4_and_letter(
     content = sheet.Sheet(
         "A $joint_ of " + LETTERS * "two ",
         "fail",
-        "FAIL: limit 0.05 mm",
+        "FAIL: limit 0.05 mm, MMMM WWWW between wing and frame" + " at many contacts" * 5,
         [exactness(2e-16)],
         origin({"scene": "here", "commit": "c0ffee", "recorded_at": "2026-01-02T03:04:05"}),
         {"scan.csv": "0123456789abcdef" * 4},
