@@ -14,7 +14,6 @@ from rich.console import Console
 
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
-from harness.planning.tolerance_search import OUT_OF_TIME
 from harness.results import records
 from harness.results.records import Row
 from harness.results.row_validation import refuse_wrong_kinds
@@ -187,7 +186,9 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
 
 
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
-    """Whether a row is of another scene, series, solver or accuracy, or hit a limit that is wider now."""
+    """Whether a row is of another scene, series, solver or accuracy, or hit a limit that is wider now, or
+    was not run by an older version.
+    """
     current = {
         "scene_key": scene_key,
         "solver_version": solver.version,
@@ -198,7 +199,6 @@ def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> b
     law = m.series.model_dump(exclude={"cases"}) if m.series else {}
     recorded_law = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
     changed = law != recorded_law or any(row.get(name) != value for name, value in current.items())
-    out_of_time = row["status"] in OUT_OF_TIME and row["time_limit_s"] < m.time_limit_s
-    stopped = m.suite.stop_at_times_fastest is not None and bool(row.get("stop"))
+    out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.suite.memory_limit_mib
-    return changed or (out_of_time and not stopped) or out_of_memory
+    return changed or out_of_time or out_of_memory or row["status"] == "not_run"

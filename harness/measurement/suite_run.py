@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -13,7 +13,7 @@ from rich.console import Console
 
 from harness.planning.plan import Measurement, expand, of_key, with_key
 from harness.planning.suite import Suite, to_toml
-from harness.planning.tolerance_search import exceeded_on, still_needed, time_limit
+from harness.planning.tolerance_search import still_needed
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
@@ -155,10 +155,7 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            limit_s, stop = time_limit(m, self.rows)
-            batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
-            exceeded = exceeded_on(batch[0], problem.prepared.assembly.junction_size, self.rows)
-            task = Task(batch, self.solvers[m.solver, m.variant], exceeded)
+            task = Task([m, *batch[1:]], self.solvers[m.solver, m.variant])
             yield (task, problem), task
 
 

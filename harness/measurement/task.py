@@ -22,14 +22,10 @@ from .worker import Outcome, measure, scene_to_measure
 
 @dataclass(frozen=True)
 class Task:
-    """The work of one process: a measurement, or load cases of a series.
-
-    exceeded_on : the scenes on which the solver exceeded its limits: nothing is run; "" if there are none.
-    """
+    """The work of one process: a measurement, or load cases of a series."""
 
     batch: list[Measurement]
     solver: Description
-    exceeded_on: str = ""
 
 
 @dataclass(frozen=True)
@@ -50,10 +46,7 @@ def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into the directory `answers`."""
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[Outcome]
-    if task.exceeded_on:
-        why = f"too slow or too large already on {task.exceeded_on}"
-        reports = [{"status": "not_run", "message": why}] * len(batch)
-    elif task.solver.failure:
+    if task.solver.failure:
         reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
     elif batch[0].form in forms:
         reports = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
@@ -132,7 +125,6 @@ def _row(
         "threads_asked": m.threads,
         "time_limit_s": m.time_limit_s,
         "memory_limit_mib": m.suite.memory_limit_mib,
-        "stop": m.stop or None,
         **origin,
         "scene_key": problem.scene.key,
         "solver_version": solver.version,

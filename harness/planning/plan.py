@@ -4,7 +4,7 @@ import json
 import random
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import product
@@ -17,9 +17,10 @@ from solvers.base import FORMS, Form
 
 from .suite import RandomCases, SolverEntry, Suite
 
-#: The tolerances of "auto", the loosest first, and the largest number of repeats of "auto".
-DECADES = [float(f"1e-{k}") for k in range(3, 17)]
-MOST_REPEATS = 5
+#: The tolerances of "auto", the loosest first: decades, and one about half-way between each two.
+HALF_DECADES = [float(text) for k in range(3, 17) for text in (f"1e-{k}", f"3e-{k + 1}")][:-1]
+MOST_REPEATS = 5  # of "auto"
+BEST = 1.0
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,9 @@ class Measurement:
     """One solver on one scene in one form: the work of one process.
 
     entry : the settings, one of the suite's. scene : the name in the tables; source : a name or an absolute
-    path for `read_scene`. case : the number of the load case in a series. stop : why the time limit is
-    tighter than the suite's, or "" (tolerance_search.py).
+    path for `read_scene`. case : the number of the load case in a series. guide : the scene whose rows decide
+    whether a library's form is measured on this one, and how many times as long as its best it may take there
+    (tolerance_search.py); None if all forms are.
     """
 
     suite: Suite
@@ -41,7 +43,7 @@ class Measurement:
     repeat: int
     time_limit_s: float
     case: int | None = None
-    stop: str = ""
+    guide: tuple[str, float] | None = None
 
     @property
     def solver(self) -> str:
@@ -100,7 +102,7 @@ def expand(suite: Suite) -> list[Measurement]:
 
     Repeats are interleaved: a round in the suite's order, then rounds in random orders, so that a drift of
     the machine does not affect one solver alone. Measurements that differ only in tolerance or load case keep
-    their order: a loose tolerance can show that a tight one would exceed the time limit.
+    their order.
 
     Raises InputError if nothing is left to measure or if two files have the same scene name.
     """
@@ -120,15 +122,34 @@ def expand(suite: Suite) -> list[Measurement]:
     if faults:
         raise InputError(faults)
     plan: dict[str, Measurement] = {}
+    guides = _guides(suite, list(scenes.values()))
     for source, scene in scenes.items():
         entries = [entry for entry in suite.solver if _applies(entry, scene.name, source)]
-        measurements = [m for entry in entries for m in _of_entry(suite, entry, scene, source)]
+        measurements = [
+            replace(m, guide=guides[scene.name]) for e in entries for m in _of_entry(suite, e, scene, source)
+        ]
         for m in sorted(measurements, key=_round_and_place):
             plan.setdefault(m.key, m)
     if not plan:
         allowed = f"no solver is meant for these: { ({entry.name: entry.scenes for entry in suite.solver}) }"
         raise InputError.one(suite.name, "scenes", suite.scenes, allowed)
     return list(plan.values())
+
+
+def _guides(suite: Suite, scenes: Sequence[Scene]) -> dict[str, tuple[str, float] | None]:
+    """The guide of each scene in a suite with `times_best_form`: of the first of a size, the first of the
+    next smaller size; of each other one, the first of its size, where the form must have been the best.
+    """
+    sizes = {scene.name: (scene.expected_size or (0, 0))[0] for scene in scenes}
+    first = {sizes[scene.name]: scene.name for scene in reversed(scenes)}
+    guides: dict[str, tuple[str, float] | None] = dict.fromkeys(sizes)
+    for name, n in sizes.items() if suite.times_best_form else ():
+        smaller = max((size for size in first if size < n), default=None)
+        if name != first[n]:
+            guides[name] = first[n], BEST
+        elif smaller is not None:
+            guides[name] = first[smaller], suite.times_best_form or BEST
+    return guides
 
 
 def _of_entry(suite: Suite, entry: SolverEntry, scene: Scene, source: str) -> Iterator[Measurement]:
@@ -138,7 +159,7 @@ def _of_entry(suite: Suite, entry: SolverEntry, scene: Scene, source: str) -> It
     time_limit_s = entry.time_limit_s or suite.time_limit(n)
     for form, tolerance, threads, repeat, case in product(
         entry.forms or FORMS,
-        DECADES if tolerances == "auto" else tolerances,
+        HALF_DECADES if tolerances == "auto" else tolerances,
         entry.threads or suite.threads,
         range(MOST_REPEATS if repeats == "auto" else repeats),
         range(entry.cases or suite.series.cases) if suite.series else (None,),

@@ -44,6 +44,8 @@ from problems.scene_files import read_toml, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names
 
+#: Keys that suites had until version 0.3.0.
+FORMER = ("stop_at_times_fastest",)
 SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
 FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # no control characters, no slashes
@@ -67,9 +69,9 @@ class SolverEntry(BaseModel):
     """One [[solver]]: its name and options, and the scenes, forms and tolerances that it is measured on.
 
     The default of `forms` is the dual, or the primal if the solver takes no other. `threads` and `cases`
-    override the suite's. "auto" as tolerances searches for the loosest decade that reaches the limit on each
-    scene, as repeats it repeats what is quick (tolerance_search.py). batched : load cases of a series solved
-    at once, by the solver's `batched`. with = ["piqp==0.6.2"] measures it in an environment that has this
+    override the suite's. "auto" as tolerances searches for the loosest that reaches the limit on each scene,
+    as repeats it repeats what is quick (tolerance_search.py). batched : load cases of a series solved at
+    once, by the solver's `batched`. with = ["piqp==0.6.2"] measures it in an environment that has this
     version of its library, and what else is listed.
     """
 
@@ -122,9 +124,9 @@ class Suite(BaseModel):
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
-    stop_at_times_fastest stops a measurement that takes so many times as long as the fastest library
-    (tolerance_search.py). After reference_limit_s no further method is tried for a reference; by default 60 s
-    per thousand contacts, at least 60.
+    times_best_form leaves out forms in which a library is slow on smaller scenes (tolerance_search.py). After
+    reference_limit_s no further method is tried for a reference; by default 60 s per thousand contacts, at
+    least 60.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -138,7 +140,7 @@ class Suite(BaseModel):
     threads: Annotated[list[PositiveInt], NonEmpty] = [2]
     time_limit_s: Positive = 60.0
     time_limit_by_size_s: dict[PositiveInt, Positive] = {}
-    stop_at_times_fastest: Annotated[float, Field(ge=1)] | None = None
+    times_best_form: Annotated[float, Field(ge=1)] | None = None
     memory_limit_mib: PositiveInt = 8192
     reference_limit_s: Positive | None = None
     limit_mm: Positive = 1e-7
@@ -195,7 +197,7 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
 
 def read_written(path: Path) -> Suite:
     """The suite.toml of a results directory. Raises InputError."""
-    return validated(read_toml(path), path)
+    return validated({key: value for key, value in read_toml(path).items() if key not in FORMER}, path)
 
 
 def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:

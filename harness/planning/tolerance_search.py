@@ -1,31 +1,32 @@
-"""Decides which measurements are still worth running, and for how long, from the rows measured so far.
+"""Decides which measurements are still worth running, from the rows measured so far.
 
-tolerances = "auto" searches, decade by decade, for the loosest tolerance whose answer is within the limit on
-the scene. repeats = "auto" repeats what is quick. stop_at_times_fastest = k stops what takes k times as long
-as the fastest other library, and does not run what was stopped on two scenes of a size on the others.
+tolerances = "auto" searches for the loosest tolerance whose answer is within the limit on the scene.
+repeats = "auto" repeats what is quick. times_best_form = k measures a library in all its forms on the first
+scene of the smallest size; on the first scene of each other size in those that took at most k times as long
+as its best on the first scene of the next smaller size; on the other scenes in the best of the first.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import inf
+from math import inf, sqrt
 
 from harness.results.records import Row
 from harness.results.schema import STEPS
 
-from .plan import DECADES, MOST_REPEATS, Measurement
+from .plan import HALF_DECADES, MOST_REPEATS, Measurement
 
 #: (seconds of the first run below which, repeats).
 REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
-#: The statuses of a measurement that ran out of its time, or was not started because it would have; and of
-#: one that exceeded a limit.
-OUT_OF_TIME = ("time_limit", "not_run")
-EXCEEDED = (*OUT_OF_TIME, "memory_limit")
+EXCEEDED = ("time_limit", "memory_limit")
 START = 1e-6  # of a search, where the solver has no rows in the form
-LEAST_S = 10.0  # before a measurement is stopped by `stop_at_times_fastest`
+DECADE = 2  # places in HALF_DECADES
+LITTLE = sqrt(10)  # times the limit: an error that half a decade may mend
 
 
 def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
     """The measurement in m's place in the plan, at the next tolerance of a search; None if there is none."""
+    if not in_a_good_form(m, rows):
+        return None
     first = [row for row in _of_cell(m, rows) if row["repeat"] == 0]
     if m.searched:
         tolerance = next_tolerance(m, rows)
@@ -39,65 +40,44 @@ def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
     return m
 
 
+def in_a_good_form(m: Measurement, rows: Sequence[Row]) -> bool:
+    """Whether m's form was good enough on the scene that guides m, or nothing is known of it there."""
+    scene, times = m.guide or ("", inf)
+    seconds: dict[str, float] = {}
+    for row in rows:
+        if row["scene"] == scene and row["owner"] == "library" and m.same_settings(row | {"form": m.form}):
+            own = _seconds(row) if row["verdict"] == "within" else inf
+            seconds[row["form"]] = min(own, seconds.get(row["form"], inf))
+    best = min(seconds.values(), default=inf)
+    return not seconds or (m.form in seconds and seconds[m.form] <= times * best)
+
+
 def next_tolerance(m: Measurement, rows: Sequence[Row]) -> float | None:
     """The next of the tolerances tried for m's solver in its form on m's scene, or None at the end.
 
-    The first is the one tried last on another scene or by another variant. A tolerance that sufficed, or at
+    The first is the decade tried last on another scene or by another variant. A decade that sufficed, or at
     which the solver gave no answer, is followed by the next looser one; one that was solved and missed the
-    limit by the next tighter one. The search ends where that one was tried or does not exist, and where all
-    tolerances tried exceeded a limit: two of them, or a single one after a search on another scene.
+    limit by the next tighter one. Between one that misses by little and one that suffices, half a decade is
+    tried. The search ends where all these were tried or do not exist, and where all tolerances tried exceeded
+    a limit: two of them, or a single one after a search on another scene.
     """
     same = [row for row in rows if (row["solver"], row["form"]) == (m.solver, m.form) and not row["repeat"]]
-    searched = [row for row in same if row["tolerance"] in DECADES]
-    tried = {DECADES.index(row["tolerance"]): row for row in _of_cell(m, searched)}
+    searched = [row for row in same if row["tolerance"] in HALF_DECADES]
+    tried = {HALF_DECADES.index(row["tolerance"]): row for row in _of_cell(m, searched)}
     if not tried:
-        return float(searched[-1]["tolerance"]) if searched else START
+        decades = [row["tolerance"] for row in searched if row["tolerance"] in HALF_DECADES[::DECADE]]
+        return float(decades[-1]) if decades else START
     enough = 2 if len(tried) == len(searched) else 1
     if len(tried) >= enough and all(row["status"] in EXCEEDED for row in tried.values()):
         return None
     within = [k for k, row in tried.items() if row["verdict"] == "within"]
     missed = [k for k, row in tried.items() if row["status"] == "solved" and k not in within]
-    k = min(within) - 1 if within else max(missed) + 1 if missed else min(tried) - 1
-    return DECADES[k] if k in range(len(DECADES)) and k not in tried else None
-
-
-def time_limit(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
-    """The time limit of m, s, and why it is tighter than the suite's; "" if it is not.
-
-    max(10 s, k × the seconds of the fastest library other than m's that is within the limit on m's scene),
-    with k = `stop_at_times_fastest` of the suite.
-    """
-    others = [
-        (_seconds(row), f"{row['solver']} {row['form']}")
-        for row in rows
-        if row["scene"] == m.scene and row["verdict"] == "within" and row["repeat"] == 0
-        if row["owner"] == "library" and row["solver"] != m.solver
-    ]
-    times = m.suite.stop_at_times_fastest
-    if times is None or not others:
-        return m.time_limit_s, ""
-    fastest, name = min(others)
-    limit_s = max(LEAST_S, times * fastest)
-    if limit_s >= m.time_limit_s:
-        return m.time_limit_s, ""
-    return limit_s, f"{times:g} × {name} ({fastest:.2g} s), at least {LEAST_S:g} s"
-
-
-def exceeded_on(m: Measurement, n: int, rows: Sequence[Row]) -> str:
-    """The scenes on which m's solver exceeded its limits, so that m is not run; "" if it is run.
-
-    That is m's own scene, if the solver ran out of at least m's time there at m's tolerance or a looser one.
-    In a suite with `stop_at_times_fastest` it is also two other scenes of n unknowns, if the time or the
-    memory ran out at each tolerance on all such scenes.
-    """
-    for row in _of_cell(m, rows):
-        late = row["status"] in OUT_OF_TIME and row["time_limit_s"] >= m.time_limit_s
-        if late and row["tolerance"] >= m.tolerance:
-            return f"{m.scene} at {row['tolerance']:g}"
-    others = [row for row in rows if m.same_settings(row) and row["n"] == n and row["scene"] != m.scene]
-    scenes = sorted({row["scene"] for row in others})
-    exceeded = all(row["status"] in EXCEEDED for row in others)
-    return ", ".join(scenes) if m.suite.stop_at_times_fastest and exceeded and len(scenes) > 1 else ""
+    if within and min(within) % DECADE:
+        return None
+    k = min(within) - DECADE if within else max(missed) + DECADE if missed else min(tried) - DECADE
+    if within and k in tried and (tried[k]["displacement_error_mm"] or inf) <= LITTLE * tried[k]["limit_mm"]:
+        k += 1
+    return HALF_DECADES[k] if k in range(len(HALF_DECADES)) and k not in tried else None
 
 
 def _of_cell(m: Measurement, rows: Sequence[Row]) -> list[Row]:

@@ -21,7 +21,7 @@ Status = Literal[
     "memory_limit",
     "crashed",
     "unsupported",  # the solver does not take this form
-    "not_run",  # the solver exceeded its limits before, so not started
+    "not_run",  # not started; in rows until version 0.3.0
 ]
 STATUSES: tuple[Status, ...] = get_args(Status)
 
@@ -148,7 +148,6 @@ class MeasurementRow(Report, Origin, total=False):
     series: dict[str, Any] | None
     time_limit_s: float
     memory_limit_mib: int
-    stop: str | None  # why time_limit_s is tighter than the suite's
     limit_mm: float  # for the displacement error, on a rung of a ladder computed; in the suite:
     limit_asked_mm: float
 

@@ -6,7 +6,7 @@ duality gap are below the tolerance; the relative gap test is off. `AlmostSolved
 In the dual form, Q has eigenvalues down to 1e-5 mm/N, and the objective is about 1e8 N·mm with a rounding
 error of 1e-8. At n = 4386, equilibration and a regularisation of 1e-8 then end in a failure or an error of
 about 1e-5 mm; without the former and with 1e-12 for the latter, three such problems end within 1e-10 mm. The
-primal and the sparse form keep the defaults (docs/libraries.md).
+sparse form, too, is faster with 1e-12; the primal form keeps the defaults (docs/libraries.md).
 """
 
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import clarabel
 import numpy as np
 
-from solvers.adapter import Converted, Library, gap_tolerance, rows_for_bounds, upper_triangle
+from solvers.adapter import Converted, Library, gap_tolerance, is_sparse, rows_for_bounds, upper_triangle
 from solvers.base import Answer, LoadCase, Problem, Status, WarmStart
 from solvers.options import apply
 
@@ -52,8 +52,8 @@ class Clarabel(Library):
         settings.tol_feas = tolerance
         settings.tol_gap_abs = gap_tolerance(tolerance, load)
         settings.tol_gap_rel = 0.0
-        if state.problem.bounded:
-            settings.equilibrate_enable = False
+        settings.equilibrate_enable = not state.problem.bounded
+        if state.problem.bounded or is_sparse(state.problem.blocks):
             settings.static_regularization_constant = 1e-12
         apply(settings, self.selected | self.settings)
         return settings

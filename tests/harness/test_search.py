@@ -10,9 +10,9 @@ from suite_runs import rows_of, said_by
 
 from harness.measurement.suite_run import run
 from harness.planning.overrides import Overrides, overridden, tolerances_of
-from harness.planning.plan import DECADES, Measurement, expand
+from harness.planning.plan import HALF_DECADES, Measurement, expand
 from harness.planning.suite import read_suite, suite_from
-from harness.planning.tolerance_search import START, next_tolerance, still_needed, time_limit
+from harness.planning.tolerance_search import START, next_tolerance, still_needed
 from problems.errors import InputError
 from report.results.reader import read
 
@@ -50,7 +50,7 @@ def test_the_search_ends_at_the_first_tolerance_that_suffices(tmp_path: Path) ->
     first = [row for row in rows if row["repeat"] == 0]
     tried = {row["tolerance"]: row["verdict"] for row in first}
     enough = max(tolerance for tolerance, verdict in tried.items() if verdict == "within")
-    looser = DECADES[DECADES.index(enough) - 1]
+    looser = HALF_DECADES[HALF_DECADES.index(enough) - 2]
     assert first[0]["tolerance"] == START
     assert tried[looser] == "outside"
     # Only what is enough is repeated; and nothing is left for the same command.
@@ -94,13 +94,19 @@ def test_it_ends_where_the_solver_gives_up(tmp_path: Path) -> None:
         ({1e-6: "time_limit", 1e-5: "outside"}, None),
         ({1e-6: "inaccurate", 1e-5: "within", 1e-4: "within", 1e-3: "within"}, None),
         ({1e-16: "outside"}, None),
+        ({1e-3: "outside 3.1e-7", 1e-4: "within"}, 3e-4),
+        ({1e-3: "outside 3.2e-7", 1e-4: "within"}, None),
+        ({1e-3: "outside 1.1e-7", 1e-4: "within", 3e-4: "outside 1.05e-7"}, None),
+        ({1e-3: "outside 1.1e-7", 1e-4: "within", 3e-4: "within"}, None),
+        ({1e-3: "outside 1.1e-7"}, 1e-4),
     ],
 )
 def test_the_next_tolerance(tmp_path: Path, tried: dict[float, str], expected: float | None) -> None:
     m = expand(suite_of(tmp_path))[0]
     rows = []
-    for tolerance, ended in tried.items():
+    for tolerance, (ended, *error) in ((each, words.split()) for each, words in tried.items()):
         row = row_of(replace(m, tolerance=tolerance), 1.0, ended if ended == "within" else "outside")
+        row["displacement_error_mm"] = float(*error) if error else None
         rows.append(row | ({"status": ended} if ended in ("time_limit", "inaccurate") else {}))
     assert next_tolerance(m, rows) == expected
 
@@ -113,33 +119,8 @@ def test_a_search_after_one_on_another_scene_starts_at_its_last_tolerance(tmp_pa
     assert next_tolerance(m, rows) == 1e-5
     assert next_tolerance(m, [*rows, rows[1] | {"scene": m.scene}]) is None
     assert next_tolerance(m, [*rows, row_of(replace(m, tolerance=1e-5), 1.0)]) == 1e-4
-
-
-@pytest.mark.parametrize(
-    ("others", "limit_s", "stop"),
-    [
-        ([], 60.0, ""),
-        ([("piqp", "library", 2.0, "within"), ("osqp", "library", 1.5, "outside")], 20.0, "10 × piqp"),
-        ([("piqp", "library", 0.2, "within")], 10.0, "at least 10 s"),
-        ([("piqp", "library", 7.0, "within")], 60.0, ""),
-        ([("newton", "ours", 0.2, "within"), ("rough", "library", 1.0, "within")], 60.0, ""),
-        ([("newton", "ours", 0.2, "within"), ("rough sparse", "library", 1.0, "within")], 60.0, ""),
-        ([("piqp", "library", 1.5, "within"), ("rough", "library", 1.0, "within")], 15.0, "10 × piqp"),
-    ],
-)
-def test_stops(tmp_path: Path, others: list[tuple[str, str, float, str]], limit_s: float, stop: str) -> None:
-    suite = suite_of(tmp_path).model_copy(update={"stop_at_times_fastest": 10.0})
-    m = replace(expand(suite)[0], time_limit_s=60.0)
-    rows = [
-        row_of(m, seconds, verdict)
-        | {"owner": group}
-        | dict(zip(("solver", "form", "variant"), name.split(), strict=False))
-        for name, group, seconds, verdict in others
-    ]
-    limit, why = time_limit(m, rows)
-    assert limit == pytest.approx(limit_s)
-    assert stop in why
-    assert bool(why) == bool(stop)
+    half = row_of(replace(m, tolerance=3e-7), 1.0) | {"scene": "a"}
+    assert next_tolerance(m, [*rows, half]) == 1e-5  # a search begins at a decade
 
 
 def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str, Any]:
@@ -147,7 +128,8 @@ def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str,
     steps = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "form_s")) | {"solve_s": seconds}
     asked = {name: getattr(m, name) for name in names} | {"threads_asked": m.threads}
     asked["options"] = m.entry.options
-    return asked | steps | {"verdict": verdict, "status": "solved", "n": 4}
+    judged = {"verdict": verdict, "status": "solved", "displacement_error_mm": None, "limit_mm": 1e-7}
+    return asked | steps | judged | {"n": 4, "owner": "library"}
 
 
 @pytest.mark.parametrize(("seconds", "repeats"), [(0.1, 5), (3.0, 3), (30.0, 1)])
