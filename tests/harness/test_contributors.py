@@ -19,7 +19,7 @@ from problems.load_cases import Listed, LoadCases
 from problems.load_cases.random_inputs import RandomInputs
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
-from report.figures.contributors import indices
+from report.figures.contributors import indices, of_contacts
 from report.results.series_results import Series, read
 
 FIXED = ("random = {", "# random = {")
@@ -113,6 +113,15 @@ def test_what_is_written(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(table, indices(read(out)), rtol=1e-12)
     assert table["input"].tolist() == ["pressure.value", "initial_gap.random"]
     assert (out / "report/contributors.png").stat().st_size > 1000
+    done = read(out)
+    table = pd.read_csv(out / "report/contributors-map.csv")
+    for j in (0, 22):
+        gap = done.gaps[np.arange(16), j : j + 1][:, 0].astype(float)
+        alone = indices(replace(done, cases=done.cases.assign(max_gap_mm=gap)))
+        for order in ("first_order", "total_order"):
+            row = table[[f"{name}, {order}" for name in alone["input"]]].iloc[j]
+            np.testing.assert_allclose(row, alone[order], rtol=1e-9)
+    assert of_contacts(done).shape == (2, 2, 45)
     lost = replace(read(out), cases=read(out).cases[1:])
     assert indices(lost).empty
 
