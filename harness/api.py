@@ -14,7 +14,8 @@ InputError. Matrices are cached as by the command line. Arrays are copied, and t
 (solving/call_lock.py).
 """
 
-from harness.commands import load_case_series, plain_arrays, run_comparison, suite_runs
+from harness.commands import limit_search, load_case_series, plain_arrays, run_comparison, suite_runs
+from harness.commands.limit_search import Tolerance
 from harness.commands.load_case_series import SeriesOutcome
 from harness.commands.suite_runs import SuiteOutcome
 from harness.conformance import check
@@ -71,6 +72,7 @@ __all__ = [
     "StageAnswer",
     "Stresses",
     "SuiteOutcome",
+    "Tolerance",
     "check_solver",
     "compare",
     "export",
@@ -89,6 +91,7 @@ __all__ = [
     "solve_dual",
     "solve_series",
     "stresses",
+    "tolerance",
     "validate",
 ]
 
@@ -110,4 +113,5 @@ solve = in_turn(solution.solve)
 solve_dual = in_turn(plain_arrays.solve_dual)
 solve_series = in_turn(plain_arrays.solve_series)
 stresses = in_turn(plate_stress.stresses)
+tolerance = in_turn(limit_search.tolerance)
 validate = in_turn(checks.validate)

@@ -23,6 +23,7 @@ from .scene import init, solve, validate
 from .series import series
 from .shim import shim
 from .suite import gate, report, run
+from .tolerance import tolerance
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
@@ -43,6 +44,7 @@ def harness() -> None:
       python -m harness series SCENE --out DIR    thousands of load cases on one assembly
       python -m harness place SCENE --out DIR     the fewest fasteners that keep a gap
       python -m harness shim SCENE --out DIR      the fewest shims that keep a gap
+      python -m harness tolerance SCENE --out DIR how far a key may go
       python -m harness explore SCENE             a page on which fasteners move
       python -m harness compare OLD NEW           what became worse between two runs
       python -m harness COMMAND --help            help on each command
@@ -97,7 +99,7 @@ def list_(what: Literal["solvers", "scenes", "suites", "formats"]) -> None:
 
 
 app.callback(help=docstring(harness))(harness)
-ONE_SCENE: list[Callable[..., None]] = [init, validate, solve, series, place, shim, explore]
+ONE_SCENE: list[Callable[..., None]] = [init, validate, solve, series, tolerance, place, shim, explore]
 OTHERS: list[Callable[..., None]] = [run, report, gate, compare, check, list_, export, import_, judge]
 for command in ONE_SCENE + OTHERS:
     app.command(command.__name__.strip("_"), help=docstring(command))(command)

@@ -84,6 +84,12 @@ Scheduler = Annotated[
 ]
 
 
+Share = Annotated[
+    float | None, option("SHARE", "Of the cases that must keep the gap.  [default: 0.95]", min=0.01, max=1.0)
+]
+Resolution = Annotated[float | None, option("SHARE", "Of the range that is told apart.  [default: 0.01]")]
+
+
 @contextmanager
 def error_reporting(
     safe: str = "; rows already written are safe, run again to continue",

@@ -18,10 +18,12 @@ from .options import (
     MemoryLimit,
     Missing,
     Plugin,
+    Resolution,
     Scans,
     SceneName,
     Scheduler,
     Seed,
+    Share,
     Spread,
     Variance,
     error_reporting,
@@ -52,6 +54,11 @@ def series(
         list[str] | None,
         option("KEY=VALUES", "A key of the scene and its values. Repeatable, for all combinations."),
     ] = None,
+    find: Annotated[
+        str | None, option("KEY=LOW:HIGH", "Find how far a key may go to keep --allow-gap in a --share.")
+    ] = None,
+    share: Share = None,
+    resolution: Resolution = None,
     solver: Annotated[str, option("NAME", "The solver.")] = "newton",
     form: Annotated[
         FormName | None, option("FORM", "primal, dual or sparse.  [default: the cheaper one]")
@@ -100,6 +107,8 @@ def series(
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.2,0.4 \\
                                          --sweep fasteners.preload=500:1500:11 --out results/both
+      python -m harness series 4386/0107 --find fasteners.preload=100:4000 --allow-gap 0.05 --share 0.95 \\
+                                         --sd 0.2 --correlation-length 150 --out results/force
       python -m harness series 4386/1074 --cases 1000 --threads 1 --scheduler local:2 --out results/gaps
 
     \b
@@ -107,20 +116,31 @@ def series(
                 3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with error_reporting() as console:
+        from harness.commands.limit_search import tolerance as find_limit
         from harness.commands.load_case_series import run_series
         from harness.series.load_case_source import GapCases
         from harness.series.session import SeriesOptions
         from harness.terminal.console import ConsoleReporter, show_verdict
+        from problems.errors import InputError
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         read_by = table_options(columns, missing)
         sources = around, gaps, read_by, tuple(random or ()), contributors, scans, variance
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
+        source = GapCases(cases, seed, mean, sd, correlation_length, *sources)
+        settings = SeriesOptions(solver, form, *accuracy, threads, plugin, *limits)
+        if find or share or resolution:
+            if sweep or not find or allow_gap is None:
+                raise InputError.one("--find", "KEY=LOW:HIGH", find, "with --allow-gap, without --sweep")
+            goal, told = (allow_gap, share or 0.95, resolution or 0.01), ConsoleReporter(console, plain=True)
+            answer = find_limit(scene, out, find, *goal, source, settings, scheduler, told)
+            kind = "pass" if answer.passed else "fail"
+            raise typer.Exit(show_verdict(kind, answer.sentences, console))
         outcome = run_series(
             scene,
             out,
-            GapCases(cases, seed, mean, sd, correlation_length, *sources),
-            SeriesOptions(solver, form, *accuracy, threads, plugin, *limits),
+            source,
+            settings,
             sweep=sweep or (),
             allow_gap_mm=allow_gap,
             scheduler=scheduler,

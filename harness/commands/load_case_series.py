@@ -64,7 +64,7 @@ class SeriesOutcome:
 
 @keeps_threads
 def run_series(
-    scene: str | Path,
+    scene: str | Path | Scene,
     out: str | Path,
     cases: GapCases = DEFAULT,
     options: SeriesOptions = STANDARD,
@@ -73,13 +73,14 @@ def run_series(
     allow_gap_mm: float | None = None,
     scheduler: str | None = None,
     reporter: Reporter = SILENT,
+    report: bool = True,
 ) -> SeriesOutcome:
     """Solve many load cases on one assembly, and keep them in a directory.
 
     Parameters
     ----------
-    scene : str or Path
-        Name of a scene, or the path of its file.
+    scene : str, Path or Scene
+        Name of a scene, the path of its file, or a scene that was read.
     out : str or Path
         The directory; the same call continues what was interrupted, more cases extend it.
     cases : GapCases, optional
@@ -94,6 +95,8 @@ def run_series(
         Dask workers: local:N, or the address of a scheduler; by default this process.
     reporter : Reporter, optional
         Is told what to know beforehand; silent by default.
+    report : bool, optional
+        Whether the report is written.
 
     Returns
     -------
@@ -112,9 +115,9 @@ def run_series(
     >>> [row["verdict"] for row in done.rows]
     ['within', 'within']
     """
-    source, directory, solver = str(scene), Path(out), options.solver
+    directory, solver = Path(out), options.solver
     refuse_unusable(allow_gap_mm)
-    read = read_scene(source)
+    read = scene if isinstance(scene, Scene) else read_scene(str(scene))
     if isinstance(read, JointScene) and not (sweep or cases.gaps or cases.scans):
         told = {text.partition("=")[0] for text in cases.random}
         in_scene = [text for text in read.random if text.partition("=")[0] not in told]
@@ -152,13 +155,13 @@ def run_series(
     verdict: dict[str, Any] = {"kind": "", "said": []}
     if allow_gap_mm is not None and code in (DONE, NOTHING_JUDGED):
         verdict = check_series(directory, allow_gap_mm)
-    report = None
-    if written := series_file.read_facts(directory):
+    path = None
+    if report and (written := series_file.read_facts(directory)):
         series_file.write_fact(directory, "series", to_line(written | {"inputs": fingerprints(inputs)}))
         from report.writers.series_report import write  # slow to import: not before the first row
 
-        report = write(directory)
-    return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], report)
+        path = write(directory)
+    return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], path)
 
 
 def _refuse_with_stages(scene: Scene, keys: Sequence[str], plugin: Path | None) -> None:

@@ -70,6 +70,18 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
 
 
 @contextmanager
+def shared(scheduler: str | None, console: Console) -> Iterator[str | None]:
+    """The address of workers that several series use; those of `local:N` begin and end here."""
+    if not local_workers(scheduler):
+        yield scheduler
+        return
+    with workers(str(scheduler), console):
+        from distributed import default_client
+
+        yield default_client().scheduler.address
+
+
+@contextmanager
 def _uninterrupted() -> Iterator[None]:
     """Processes that begin within ignore Ctrl-C: this process ends them."""
     if threading.current_thread() is not threading.main_thread():  # only that one can

@@ -54,6 +54,16 @@ def larger(allowed_mm: float, gap: Vector, e: Vector) -> tuple[Mask, Mask]:
     return certain, ~told | (~certain & (gap + e > allowed_mm))
 
 
+def share_interval(kept: int, count: int) -> tuple[float, float]:
+    """The interval of Clopper and Pearson for the share of all cases that `kept` of `count` cases show."""
+    from scipy.special import betaincinv  # slow to import: not before the first row
+
+    half = (1 - CONFIDENCE) / 2
+    low = betaincinv(kept, count - kept + 1, half) if kept else 0.0
+    high = betaincinv(kept + 1, count - kept, 1 - half) if kept < count else 1.0
+    return float(low), float(high)
+
+
 def check_answer(
     solution: Solution, allowed_mm: float, pairs: list[dict[str, Any]], mesh: MeshError | None
 ) -> dict[str, Any]:
@@ -109,9 +119,7 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
 
     kind : pass, fail, or "" where it cannot be told. said : sentences, the outcome last.
     """
-    from scipy.stats import binomtest  # slow to import, as is the report: not before the first row
-
-    from report.results.series_results import read
+    from report.results.series_results import read  # slow to import: not before the first row
     from report.writers.exceeding_files import write
 
     series = read(directory)
@@ -123,7 +131,7 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
     if answered and not series.swept:  # steps are no sample
         free = exceeding(series.independent, allowed_mm)
         kept = free.answered - len(free.cases) - free.undecided
-        low, high = binomtest(kept, free.answered).proportion_ci(CONFIDENCE, "exact")
+        low, high = share_interval(kept, free.answered)
         sure += f"; the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
     kind, said = "" if result.undecided or not answered else "pass", [f"{sure}."]
     if result.undecided:

@@ -128,12 +128,13 @@ def _step(scene: JointScene, text: str, faults: list[Fault]) -> tuple[Key, tuple
     return keys[name], numbers
 
 
-def keys_of(scene: JointScene) -> dict[str, Key]:
-    """The numbers of a scene that change f or g, and not K, by their names."""
+def keys_of(scene: JointScene, stiffness: bool = False) -> dict[str, Key]:
+    """The numbers of a scene that change f or g, and not K unless `stiffness` is true, by their names."""
     keys: dict[str, Key] = {}
     for i, effect in enumerate(scene.effects):
-        paths = [] if isinstance(effect, StiffnessEffect) else _numbers(effect.model_dump())
-        if isinstance(effect, SpringEffect):  # the others change K
+        changes_K = isinstance(effect, StiffnessEffect) and not stiffness
+        paths = [] if changes_K else _numbers(effect.model_dump())
+        if isinstance(effect, SpringEffect) and not stiffness:  # the others change K
             paths = [path for path in paths if path[0] in SpringEffect.model_fields]
         elif isinstance(effect, Positions):
             paths += [("points", "x"), ("points", "y")]

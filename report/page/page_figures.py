@@ -5,7 +5,7 @@ Bokeh takes half a second to import: the map, which all pages show, and the scri
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,7 +34,7 @@ def scripts() -> str:
 
 def map_item(names: list[str]) -> Any:
     """The item of `map_figure`."""
-    return _kept(["map", *names], lambda: items(map_figure(names), ["map"])[0])
+    return _kept(["map", *names], lambda: item(map_figure(names), "map"))
 
 
 def _kept(what: list[str], make: Callable[[], Any]) -> Any:
@@ -42,29 +42,30 @@ def _kept(what: list[str], make: Callable[[], Any]) -> Any:
     return load_or_make(key, lambda: ({}, {"made": make()}))[1]["made"]
 
 
-def items(plot: figure, names: Sequence[str]) -> list[Any]:
-    """A figure as JSON for `Bokeh.embed.embed_item`, once for each of some names.
+def item(plot: figure, name: str) -> Any:
+    """A figure as JSON for `Bokeh.embed.embed_item`.
 
-    Bokeh numbers its models through the process; here they are numbered anew, behind a name, which differs
+    Bokeh numbers its models through the process; here they are numbered anew, behind `name`, which differs
     among the figures of a page, so that equal data give equal pages.
     """
     from bokeh.embed import json_item
 
-    def renumbered(value: Any, name: str, numbers: dict[str, str]) -> Any:
+    numbers: dict[str, str] = {}
+
+    def renumbered(value: Any) -> Any:
         match value:
             case dict():
                 return {
                     key: numbers.setdefault(inner, f"{name}-{len(numbers)}")
                     if key in ("id", "root_id")
-                    else renumbered(inner, name, numbers)
+                    else renumbered(inner)
                     for key, inner in value.items()
                 }
             case list():
-                return [renumbered(inner, name, numbers) for inner in value]
+                return [renumbered(inner) for inner in value]
         return value
 
-    made = json_item(plot)
-    return [renumbered(made, name, {}) for name in names]
+    return renumbered(json_item(plot))
 
 
 def map_figure(names: Iterable[str]) -> figure:

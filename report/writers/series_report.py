@@ -14,7 +14,7 @@ from report.document.numbers import counted, out_of, significant, tidy_power
 from report.figures import contributors, style
 from report.figures.junction_maps import Map, drawn, larger_than, rooted
 from report.page.contact_maps import hover_names, map_controls, series_maps
-from report.page.page_figures import exceedance_figure, items, map_item
+from report.page.page_figures import exceedance_figure, item, map_item
 from report.page.page_file import Data, banner
 from report.page.page_file import write as write_page
 from report.results.series_results import (
@@ -236,6 +236,6 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
         "maps": maps,
         "figures": {
             "map": map_item(hover_names(maps)),
-            "curves": items(exceedance_figure(curves), ["curves"])[0],
+            "curves": item(exceedance_figure(curves), "curves"),
         },
     }

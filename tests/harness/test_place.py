@@ -361,7 +361,7 @@ def test_a_plan_moves_onto_the_nearest_free_holes() -> None:
 
 
 def place(path: Path, out: Path, *words: object) -> Any:
-    return harness("place", path, "--candidates", "2x4", "--cases", 6, "--share", 1, "--out", out, *words)
+    return harness("place", path, "--candidates", "2x6", "--cases", 6, "--share", 1, "--out", out, *words)
 
 
 @pytest.fixture(scope="module")
@@ -391,7 +391,7 @@ def test_the_command_finds_a_plan_that_solve_confirms(
     assert [list(p) for p in MovableFasteners.of(read_scene(str(plan))).current] == best["plan"]
     series = harness("series", plan, "--cases", 6, "--allow-gap", 0.05, "--out", tmp_path / "again")
     assert series.exit_code == 0, series.output
-    assert "8 fasteners, all candidates: " in said  # progress, though this is no terminal
+    assert "12 fasteners, all candidates: " in said  # progress, though this is no terminal
     assert "(1 plan proven)" in said
     drawn = harness("report", tmp_path / "out" / "plan")
     assert drawn.exit_code == 0, drawn.output
@@ -407,7 +407,7 @@ def test_the_command_finds_a_plan_that_solve_confirms(
     for words, reason in (
         (("--allow-gap", 0.05, "--seed", 1), "cases_key"),
         (("--allow-gap", 0.04), "limit_mm = 0.05: now 0.04: name another directory with --out"),
-        (("--allow-gap", 0.05, "--candidates", "2x5"), "candidates = '8 places"),
+        (("--allow-gap", 0.05, "--candidates", "2x5"), "candidates = '12 places"),
     ):
         other = place(strip, tmp_path / "out", *words)
         assert other.exit_code == 2
@@ -467,7 +467,7 @@ def records_of(directory: Path) -> dict[str, Any]:
 def test_a_limit_that_no_plan_keeps_says_where_and_by_how_much(strip: Path, tmp_path: Path) -> None:
     done = place(strip, tmp_path / "out", "--allow-gap", 0.001)
     assert done.exit_code == 4
-    for word in ("FAIL", "all of the 8 fasteners", "more than allowed", "is the worst, at ("):
+    for word in ("FAIL", "all of the 12 fasteners", "more than allowed", "is the worst, at ("):
         assert word in done.output
 
 

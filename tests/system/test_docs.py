@@ -37,7 +37,7 @@ JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 def test_the_scene_of_the_page_is_drawn_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its parts meet; the borders of the pictures are white, so that no title is cut."""
-    monkeypatch.setattr("report.figures.style.DPI", 80)
+    monkeypatch.setattr("report.figures.style.DPI", 160)
     (tmp_path / "scene.toml").write_text(JOINT[1])
     assert solve_into(str(tmp_path / "scene.toml"), None, 1e-9, tmp_path, Console(file=StringIO())) == 0
     for name in ("gap", "section", "forces", "displacement"):

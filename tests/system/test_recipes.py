@@ -15,7 +15,6 @@ PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 RECIPES = dict(re.findall(r"^### (An? .+?)\n(.*?)(?=^###? )", PAGE, re.MULTILINE | re.DOTALL))
 FILE = re.compile(r"```\w+\n# ([\w/.-]+)(?:, (after|instead of) ([^\n]+))?\n(.*?)```", re.DOTALL)
 FOLDERS = ("docs", "examples", "harness", "problems", "report", "rivetbench", "solvers", "studies", "tests")
-PLUGINS = "-o addopts= -p no:cacheprovider -p no:hypothesispytest -p no:xdist"  # that no recipe needs
 CHECKS = {
     "ruff": ["-m", "ruff", "check", "--no-cache"],
     "format": ["-m", "ruff", "format", "--check", "--no-cache"],
@@ -49,7 +48,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def passes(project: Path, words: list[str]) -> None:
-    env = os.environ | {"PYTEST_ADDOPTS": PLUGINS}
+    env = os.environ | {"PYTEST_ADDOPTS": "-p no:cacheprovider"}
     done = subprocess.run([sys.executable, *words], cwd=project, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 

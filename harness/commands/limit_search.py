@@ -1,0 +1,224 @@
+"""Finds the value of a scene's key beyond which too few joints keep a gap.
+
+Each value v of an even grid is a series of the same N load cases: case k depends on the seed and k alone. In
+k(v) of them the gap is proven to be within the limit. If one end of the range keeps it in a share s of the
+cases and the other does not, bisection finds neighbours v, v' of the grid with k(v) ≥ sN > k(v').
+
+Bisection for the least k whose interval of Clopper and Pearson begins at s or above, and for the least whose
+interval reaches s, bounds the value with 95 % confidence, if the share changes one way. Fresh cases, those of
+the next seed, tell the share at v; rows of a table chose it themselves.
+"""
+
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from math import ceil, inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.measurement.scheduler import shared, threads_per_worker
+from harness.results import records, series_file
+from harness.results.atomic_output import refuse_inputs
+from harness.results.schema import SERIES
+from harness.scene.allowed_gap import CONFIDENCE, refuse_unusable, share_interval
+from harness.series.load_case_source import DEFAULT, GapCases
+from harness.series.session import SeriesOptions
+from harness.solving.call_lock import keeps_threads
+from harness.terminal.console import console_of
+from problems.errors import InputError
+from problems.forms.assembly import Vector
+from problems.load_cases.sweep import keys_of
+from problems.model.scene import JointScene
+from problems.reporter import SILENT, Reporter
+from problems.scene_files import read_scene
+
+from .load_case_series import run_series
+
+RECORD = "tolerance.json"
+UNCHECKED = SeriesOptions(check=0)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """The outcome of `tolerance`.
+
+    Parameters
+    ----------
+    value : float, optional
+        The largest or least value that keeps the share; None if both ends of the range do, or neither.
+    interval : tuple of (float, float)
+        Where it is with 95 % confidence; infinite where that is beyond the range.
+    passed : bool
+        Whether a value, or the whole range, keeps the share, and fresh cases do not contradict it.
+    sentences : tuple of str
+        The outcome in words.
+    """
+
+    value: float | None
+    interval: tuple[float, ...]
+    passed: bool
+    sentences: tuple[str, ...]
+
+
+@keeps_threads
+def tolerance(
+    scene: str | Path,
+    out: str | Path,
+    find: str,
+    allow_gap_mm: float,
+    share: float = 0.95,
+    resolution: float = 0.01,
+    cases: GapCases = DEFAULT,
+    options: SeriesOptions = UNCHECKED,
+    scheduler: str | None = None,
+    reporter: Reporter = SILENT,
+) -> Tolerance:
+    """Find the largest, or the least, value of a key that keeps a gap in a share of the joints.
+
+    Parameters
+    ----------
+    scene : str or Path
+        Name of a scene, or the path of its file.
+    out : str or Path
+        Directory with a series of each value: the same call continues what was interrupted.
+    find : str
+        KEY=LOW:HIGH, a number of an effect, which may change K, and the range of its values. The largest is
+        found if LOW keeps the share, the least if HIGH does.
+    allow_gap_mm : float
+        The largest gap allowed, mm.
+    share : float, optional
+        Share of the joints that must keep it, above 0, at most 1.
+    resolution : float, optional
+        Distance of neighbouring values, as a share of the range.
+    cases : GapCases, optional
+        The load cases, the same for every value; by default 100 with random gaps.
+    options : SeriesOptions, optional
+        Solver, accuracy and limits.
+    scheduler : str, optional
+        Dask workers: local:N, or the address of a scheduler; by default this process.
+    reporter : Reporter, optional
+        Is told each share; silent by default.
+
+    Returns
+    -------
+    Tolerance
+        The value with its interval, and what fresh cases say of it.
+
+    Raises
+    ------
+    InputError
+        If an input is wrong, the key changes no gap, or `out` has other series of these values.
+
+    Examples
+    --------
+    >>> from rivetbench import GapCases, tolerance
+    >>> find, few = "initial_gap.random.sd=0.01:0.4", GapCases(count=20)
+    >>> most = tolerance("examples/small-joint.toml", "results/sd", find, 0.05, resolution=0.1, cases=few)
+    >>> most.interval[0] <= most.value < most.interval[1]
+    True
+    """
+    read, directory = read_scene(str(scene)), Path(out)
+    keys = keys_of(read, stiffness=True) if isinstance(read, JointScene) else {}
+    name, _, ends = find.partition("=")
+    try:
+        low, high = map(float, ends.split(":"))
+    except ValueError:
+        low = high = inf
+    if name not in keys or not -inf < low < high < inf:
+        allowed = f"KEY=LOW:HIGH, LOW < HIGH, with KEY one of {', '.join(keys) or 'none in this scene'}"
+        raise InputError.one("--find", "key, range", find, allowed)
+    if not (0 < share <= 1 and 1e-6 <= resolution <= 1 and not cases.contributors):
+        allowed = "a share above 0, at most 1, a resolution from 1e-6 to 1, no --contributors"
+        raise InputError.one("--find", "share, resolution", (share, resolution), allowed)
+    refuse_unusable(allow_gap_mm)
+    refuse_inputs([directory / RECORD], read.sources)
+    key, grid = keys[name], np.linspace(low, high, ceil(1 / resolution - 1e-9) + 1)
+    values = [float(f"{value:.10g}") for value in grid]
+
+    def upper_bounds(value: float, seed: int | None = None) -> Vector:
+        """Bounds on the largest gap in each case at a value (N,) mm. seed : of fresh cases."""
+        assert isinstance(read, JointScene)
+        if wrong := key.faults(read, value, f"--find {name}"):
+            raise InputError(wrong)
+        effects, folder = list(read.effects), directory / (f"{value:.10g}" + "-fresh" * (seed is not None))
+        effects[key.effect] = key.changed(effects[key.effect], value, read.joint)
+        drawn = cases if seed is None else replace(cases, seed=seed)
+        how: Any = {"scheduler": address, "report": seed is not None}
+        how["reporter"] = reporter if value == values[0] else SILENT
+        how["allow_gap_mm"] = None if seed is None else allow_gap_mm
+        run_series(replace(read, effects=tuple(effects)), folder, drawn, options, **how)
+        count = (series_file.read_facts(folder) or {})["cases"]
+        rows = [row for row in series_file.rows(folder) if row["case"] < count]
+        if len(rows) < count:
+            raise InputError.one(folder, "cases", len(rows), f"{count}: run the same command again")
+        both = [(row.get("max_gap_mm"), row.get("gap_error_mm")) for row in rows]
+        return np.array([inf if gap is None or e is None else gap + e for gap, e in both])
+
+    bounds = cache(upper_bounds)
+
+    def kept(value: float) -> int:
+        """In how many cases a value keeps the limit."""
+        count = int((bounds(value) <= allow_gap_mm).sum())
+        reporter.say(
+            f"{name} = {value:g}: within {allow_gap_mm:g} mm in {count} of {len(bounds(value))} cases"
+        )
+        return count
+
+    options = replace(options, threads=options.threads or threads_per_worker(scheduler))
+    with records.locked(directory, (), other=SERIES), shared(scheduler, console_of(reporter)) as address:
+        count = len(bounds(values[0]))
+        if np.array_equal(bounds(values[0]), bounds(values[-1])):
+            raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
+        outcome = searched(cache(kept), values, share, count)
+        limit = f"{allow_gap_mm:g} mm in {100 * share:g} % of the joints"
+        said = [outcome.sentences[0].format(key=name, limit=limit)]
+        if outcome.value is not None and not cases.gaps:
+            fresh = bounds(outcome.value, (cases.seed or 0) + 1) <= allow_gap_mm
+            least, most = share_interval(int(fresh.sum()), count)
+            said.append(
+                f"At {outcome.value:g} it is kept in {fresh.sum()} of {count} fresh cases, proven: the share "
+                f"of joints is between {least:.2%} and {most:.2%}, with {CONFIDENCE:.0%} confidence."
+            )
+            outcome = replace(outcome, passed=most >= share)
+        outcome = replace(outcome, sentences=tuple(said))
+        asked = {"find": find, "allowed_mm": allow_gap_mm, "share": share, "cases": count}
+        records.replace_object(directory / RECORD, asked | asdict(outcome))
+    return outcome
+
+
+def searched(kept: Callable[[float], int], values: Sequence[float], share: float, count: int) -> Tolerance:
+    """The outcome by bisection. kept : in how many of the `count` cases a value keeps the limit."""
+    last, least = len(values) - 1, ceil(share * count - 1e-9)
+    ends = kept(values[0]), kept(values[-1])
+    rising = ends[0] < least
+    if rising == (ends[1] < least):
+        which = "Neither end keeps" if rising else "Both ends keep"
+        counts = f"{ends[0]} of {count} cases at {values[0]:g}, {ends[1]} at {values[-1]:g}"
+        said = f"{which} {{limit}}, by {{key}}: {counts}. Name another range."
+        return Tolerance(None, (), not rising, (said,))
+    sure, possible = (
+        bisect_left(range(count + 1), True, key=lambda k: share_interval(k, count)[end] >= share)
+        for end in (0, 1)
+    )
+
+    def edge(least: int) -> tuple[int, int]:
+        """Neighbours: the first keeps the limit in `least` cases, the second does not or is off the grid."""
+        inside, outside = (last + 1, -1) if rising else (-1, last + 1)
+        while abs(outside - inside) > 1:
+            middle = (inside + outside) // 2
+            inside, outside = (middle, outside) if kept(values[middle]) >= least else (inside, middle)
+        return inside, outside
+
+    value = values[edge(least)[0]]
+    low, high = sorted((edge(sure)[0], edge(possible)[1]))
+    interval = values[low] if low >= 0 else -inf, values[high] if high <= last else inf
+    words = f"{interval[0]:g}" if low >= 0 else f"below {values[0]:g}"
+    words += f" to {interval[1]:g}" if high <= last else f" to above {values[-1]:g}"
+    said = (
+        f"The {'least' if rising else 'largest'} {{key}} that keeps {{limit}} is {value:g} "
+        f"({100 * CONFIDENCE:g} % interval {words}), by {count} cases, the same at each value."
+    )
+    return Tolerance(value, interval, True, (said,))

@@ -1,0 +1,162 @@
+"""How far a key may go: bisection against whole grids, its interval, resumption, and what is refused."""
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import harness
+from scipy.stats import beta, binom, binomtest
+from strip_scene import write_strip
+
+from harness.commands.limit_search import searched
+from harness.results import series_file
+from harness.scene.allowed_gap import share_interval
+from harness.series.load_case_source import GapCases
+from harness.series.session import Job, SeriesSession
+from problems.load_cases import Listed
+from problems.load_cases.sweep import keys_of
+from problems.model.scene import JointScene
+from problems.scene_files import read_scene
+from rivetbench import run_series, tolerance
+
+SD, FORCE = "initial_gap.random.sd", "fasteners.preload"
+LIMIT, CASES = 0.5, 12
+GRID = ("--allow-gap", LIMIT, "--cases", CASES, "--share", 0.7)
+
+
+def counts(path: Path, key: str, values: Sequence[float]) -> list[int]:
+    """In how many cases each value keeps the limit, all of them solved in one series."""
+    scene, loads = read_scene(str(path)), []
+    assert isinstance(scene, JointScene)
+    one = keys_of(scene)[key]
+    for value in values:
+        effects = list(scene.effects)
+        effects[one.effect] = one.changed(effects[one.effect], value, scene.joint)
+        cases = GapCases(count=CASES).of(replace(scene, effects=tuple(effects)), "dual")
+        loads += [cases.load(k) for k in range(CASES)]
+    job = Job(scene=scene, cases=Listed(tuple(loads)), form="dual", check=0, threads=1)
+    rows = [row for some in SeriesSession(job).solve(range(len(loads))) for row, _ in some]
+    gaps = np.array([row["max_gap_mm"] for row in sorted(rows, key=lambda row: row["case"])])
+    return (gaps.reshape(len(values), CASES) <= LIMIT).sum(axis=1).tolist()
+
+
+@pytest.mark.parametrize(("key", "low", "high", "size"), [(SD, 0.02, 0.5, 50), (FORCE, 1.0, 600.0, 7)])
+def test_the_value_is_that_of_a_grid(tmp_path: Path, key: str, low: float, high: float, size: int) -> None:
+    """The largest scatter by one command, the least force by the other."""
+    path, out, least = write_strip(tmp_path), tmp_path / "out", 9
+    words = ("series", path, "--find", f"{key}={low}:{high}", "--check", 0)
+    if key == SD:
+        words = ("tolerance", path, "--key", key, "--range", f"{low}:{high}")
+    words += (*GRID, "--resolution", 1 / (size - 1), "--out", out)
+    done = harness(*words)
+    assert done.exit_code == 0, done.output
+    values = [float(f"{value:.10g}") for value in np.linspace(low, high, size)]
+    kept = np.array(counts(path, key, values))
+    keeps = kept >= least
+    assert (np.diff(keeps.astype(int)) != 0).sum() == 1  # one limit on the whole grid
+    best = values[np.flatnonzero(keeps)[-1 if key == SD else 0]]
+    answer = json.loads((out / "tolerance.json").read_text())
+    assert answer["value"] == best
+    assert f"The {'largest' if key == SD else 'least'} {key} that keeps 0.5 mm in 70 %" in done.output
+    assert "of 12 fresh cases, proven" in " ".join(done.output.split())
+    assert (out / f"{best:.10g}-fresh" / "report" / "report.md").exists()
+    fresh = series_file.read_facts(out / f"{best:.10g}-fresh")
+    chosen = series_file.read_facts(out / f"{best:.10g}")
+    assert fresh
+    assert chosen
+    assert fresh["identity"]["cases_key"] != chosen["identity"]["cases_key"]
+    rows = {folder.name: [*series_file.rows(folder)] for folder in out.iterdir() if folder.is_dir()}
+    if key == FORCE:  # it goes on where it stopped
+        shutil.rmtree(out / f"{high:g}")
+        assert harness(*words).exit_code == 0
+        assert json.loads((out / "tolerance.json").read_text()) == answer
+        for name, old in rows.items():
+            assert ([*series_file.rows(out / name)] == old) == (name != f"{high:g}")
+    else:
+        bounds = [beta.ppf(0.025, k, CASES - k + 1) if k else 0.0 for k in kept]
+        sure = [value for value, bound in zip(values, bounds, strict=True) if bound >= 0.7]
+        assert answer["interval"][0] == max(sure)
+
+
+@pytest.mark.parametrize(("limit", "code", "said"), [(1e-3, 4, "Neither end keeps"), (9.0, 0, "Both ends")])
+def test_the_ends_must_differ(tmp_path: Path, limit: float, code: int, said: str) -> None:
+    words = "--key", SD, "--range", "0.1:0.2", "--allow-gap", limit, "--cases", 3
+    done = harness("tolerance", write_strip(tmp_path), *words, "--out", tmp_path / "out")
+    assert done.exit_code == code
+    assert said in done.output
+    assert json.loads((tmp_path / "out" / "tolerance.json").read_text())["value"] is None
+
+
+def test_a_key_may_change_the_stiffness(tmp_path: Path) -> None:
+    """Its series is that of a scene with the value."""
+    cases = GapCases(count=3)
+    both_keep = tolerance(write_strip(tmp_path), tmp_path / "out", "ribs.I=2:9000", 9.0, 0.5, 1.0, cases)
+    assert both_keep.value is None
+    path = write_strip(tmp_path, ("I = 2e3", "I = 9000"))
+    run_series(path, tmp_path / "one", cases, report=False)
+    both = [
+        [row["max_gap_mm"] for row in series_file.rows(folder)]
+        for folder in (tmp_path / "one", tmp_path / "out" / "9000", tmp_path / "out" / "2")
+    ]
+    np.testing.assert_allclose(both[0], both[1], rtol=0, atol=1e-9)
+    assert max(abs(np.subtract(both[0], both[2]))) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--find", "initial_gap.mean=0.5:0.1"), "LOW < HIGH"),
+        (("--find", "shims.thickness=0.1:1"), "KEY one of initial_gap.mean"),
+        (("--find", f"{SD}=0.1:0.4", "--sd", 0.1), "no option in its place"),
+        (("--find", f"{SD}=0.1:0.4", "--resolution", 2), "a resolution from"),
+        (("--find", f"{SD}=0.1:0.4", "--sweep", "initial_gap.mean=1,2"), "without --sweep"),
+        (("--share", 0.5), "KEY=LOW:HIGH"),
+        (("--find", f"{FORCE}=-1:5"), "must be greater than 0"),
+    ],
+)
+def test_bad_questions_are_refused(tmp_path: Path, words: tuple[object, ...], said: str) -> None:
+    common = "--allow-gap", LIMIT, "--cases", 2, "--check", 0, "--out", tmp_path / "out"
+    done = harness("series", write_strip(tmp_path), *words, *common)
+    assert done.exit_code == 2
+    assert said in " ".join(done.output.split())
+
+
+def test_bisection_finds_the_limit_and_its_interval() -> None:
+    """On drawn shares that change one way, rising and falling, of 2 to 60 values and 1 to 300 cases."""
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        size, count, share = random.integers(2, 61), int(random.integers(1, 301)), random.uniform(0.3, 1.0)
+        values = np.cumsum(random.uniform(0.1, 1.0, size)).tolist()
+        kept = np.sort(random.integers(0, count + 1, size))[:: random.choice([-1, 1])]
+        by_value = dict(zip(values, kept.tolist(), strict=True))
+        asked: list[float] = []
+        outcome = searched(lambda v, a=asked, b=by_value: a.append(v) or b[v], values, share, count)
+        keeps, intervals = kept >= share * count, [share_interval(int(k), count) for k in kept]
+        if keeps[0] == keeps[-1]:
+            assert outcome.value is None
+            assert outcome.passed == keeps[0]
+            continue
+        falling = keeps[0]
+        inside = np.array(values)[keeps]
+        assert outcome.value == (inside.max() if falling else inside.min())
+        sure = [v for v, (low, _) in zip(values, intervals, strict=True) if low >= share]
+        impossible = [v for v, (_, high) in zip(values, intervals, strict=True) if high < share]
+        ends = (sure, impossible) if falling else (impossible, sure)
+        assert outcome.interval == (max(ends[0], default=-inf), min(ends[1], default=inf))
+        assert len(set(asked)) <= 2 + 3 * np.ceil(np.log2(size + 1))
+
+
+@pytest.mark.parametrize(("count", "share"), [(100, 0.9), (200, 0.95), (300, 0.5)])
+def test_the_interval_covers_the_share_in_95_percent(count: int, share: float) -> None:
+    """The exact probability: at least 95 %, at most 97 %."""
+    intervals = [share_interval(kept, count) for kept in range(count + 1)]
+    for kept in (0, count // 3, count):
+        known = tuple(binomtest(kept, count).proportion_ci(0.95, "exact"))
+        np.testing.assert_allclose(intervals[kept], known, rtol=1e-9)
+    covers = np.array([low <= share <= high for low, high in intervals])
+    assert 0.95 <= binom.pmf(np.flatnonzero(covers), count, share).sum() <= 0.97
