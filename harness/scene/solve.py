@@ -6,16 +6,14 @@ DIR is written beside its place and moved there when it is whole; what an older 
 import time
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from harness.results.atomic_output import RECORD, atomic_output, refuse_unwritable
 from harness.results.records import replace_text, to_line
 from harness.terminal import DONE, FAILED
-from harness.terminal.console import ConsoleReporter, show_verdict
+from harness.terminal.console import ConsoleReporter, show_verdict, table_of
 from problems.errors import InputError
 from problems.forms import Form
 from problems.scene_files import read_scene
@@ -85,16 +83,19 @@ def solve_into(
     if allow_gap_mm is not None:
         allowed_gap.check_stages(solution.stages, allow_gap_mm, record.get("stages", []))
         record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
-    if solution.stages:
-        console.print(_history(record, arrays))
-    if allow_gap_mm is not None or stressed:
-        from report.page.answer_page_data import headline  # slow to import: not before the answer is shown
+    if allow_gap_mm is not None or stressed or solution.stages:
+        from report.page.answer_page_data import (
+            headline,
+            stage_lines,
+        )  # slow to import: not before the answer
 
         verdict = headline(record, arrays)
-        if allow_gap_mm is None and allow_stress is None:
-            console.print(verdict["text"])
-        else:
+        if solution.stages:
+            console.print(table_of(stage_lines(record, arrays)))
+        if allow_gap_mm is not None or allow_stress is not None:
             code = code or show_verdict(verdict["kind"], [verdict["text"]], console)
+        elif stressed:
+            console.print(verdict["text"])
     with reporter.step("pictures and files"), atomic_output(out, scene.sources) as new:
         from report.writers.answer_report import write
 
@@ -104,14 +105,3 @@ def solve_into(
         written = out / write(new).name
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
     return code
-
-
-def _history(record: dict[str, Any], arrays: dict[str, Any]) -> Table:
-    """A line per stage: largest gap and place, closed contacts, forces, and whether the gap is allowed."""
-    from report.page.answer_page_data import stage_lines  # slow to import: not before the answer is there
-
-    heads, *lines = stage_lines(record, arrays)
-    table = Table(*heads)
-    for line in lines:
-        table.add_row(*line)
-    return table

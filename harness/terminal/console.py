@@ -19,6 +19,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.segment import Segment
+from rich.table import Table
 from rich.text import Text
 
 from harness.results.records import Row
@@ -117,6 +118,15 @@ def _with_share(text: str, fraction: float) -> str:
 
 #: The exit code and colour of a verdict on an allowed gap, by its kind; "" where it cannot be told.
 VERDICTS = {"pass": (DONE, PASS), "fail": (GAP_EXCEEDED, FAIL), "": (NOTHING_JUDGED, "yellow")}
+
+
+def table_of(lines: Iterable[Sequence[str]], caption: str | None = None) -> Table:
+    """A table of lines, the first of which is its headings."""
+    heads, *rows = lines
+    table = Table(*heads, caption=caption)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def show_verdict(kind: str, sentences: Sequence[str], console: Console) -> int:
