@@ -2,7 +2,8 @@
 
 The SHA-256 of "<version>/<n>/<k>" is eight integers u < 2³², and so is that of "<version>/<n>/<k>/1", and so
 on. Each draws one integer from low to high, as low + ⌊u (high − low + 1) / 2³²⌋. So the scenes of a version
-are the same on every machine, and the next version has others: nobody can have tuned on them.
+are the same on every machine, and the next version has others: nobody can have tuned on them. Those of a
+version are `drawn/<n>/<k>@<version>` in every later one.
 
 `drawn/superelements/<k>` are joints of superelements (`problems/random_superelements.py`).
 """
@@ -23,9 +24,10 @@ EDGE = 25.0  # mm, from the outermost fasteners to the border
 SUPERELEMENTS = "superelements"
 KINDS = (*map(str, SIZES), SUPERELEMENTS)
 EXAMPLES = [f"drawn/{kind}/0" for kind in KINDS]
-NAME = re.compile(rf"(drawn/({'|'.join(KINDS)})/)(0|[1-9][0-9]{{0,4}})")
-SUPERELEMENT_NAME = re.compile(rf"drawn/{SUPERELEMENTS}/(0|[1-9][0-9]{{0,4}})")
-RANGE = re.compile(rf"{NAME.pattern}\.\.([0-9]{{1,5}})")
+NUMBER, OF_VERSION = r"(0|[1-9][0-9]{0,4})", r"((?:@[0-9]+(?:\.[0-9]+)+)?)"
+FIRST = rf"(drawn/({'|'.join(KINDS)})/){NUMBER}"
+NAME, RANGE = re.compile(FIRST + OF_VERSION), re.compile(rf"{FIRST}\.\.([0-9]{{1,5}}){OF_VERSION}")
+SUPERELEMENT_NAME = re.compile(f"drawn/{SUPERELEMENTS}/{NUMBER}{OF_VERSION}")
 
 
 def drawn_names(pattern: str) -> list[str]:
@@ -34,8 +36,8 @@ def drawn_names(pattern: str) -> list[str]:
         return [pattern]
     if not (found := RANGE.fullmatch(pattern)):
         return []
-    folder, _, first, last = found.groups()
-    return [f"{folder}{k}" for k in range(int(first), int(last) + 1)]
+    folder, _, first, last, version = found.groups()
+    return [f"{folder}{k}{version}" for k in range(int(first), int(last) + 1)]
 
 
 #: Draws an integer from low to high.
@@ -46,7 +48,8 @@ def draw_of(name: str) -> Draw:
     """The draws of a scene, one after another."""
 
     def integers() -> Iterator[int]:
-        text = f"{__version__}/{name.removeprefix('drawn/')}"
+        drawn, _, version = name.partition("@")
+        text = f"{version or __version__}/{drawn.removeprefix('drawn/')}"
         for k in itertools.count():
             yield from struct.unpack(">8I", sha256((f"{text}/{k}" if k else text).encode()).digest())
 

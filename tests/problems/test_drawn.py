@@ -1,5 +1,6 @@
 """Scenes drawn at random: the same wherever they are drawn, others for each version, within the ranges."""
 
+import json
 import math
 from collections import Counter
 from pathlib import Path
@@ -16,6 +17,7 @@ from problems.model.positions import Pattern
 from problems.model.scene import JointScene
 from problems.random_scenes import KINDS, MEANS, ROWS, SIZES, drawn_names
 from problems.scene_files import read_scene
+from studies.publish import PUBLISHED
 
 DRAWS = [f"{DRAWN}{n}/{k}" for k in range(167) for n in SIZES]  # 501
 
@@ -52,6 +54,20 @@ def test_a_name_gives_the_same_scene_everywhere(monkeypatch: pytest.MonkeyPatch)
     assert pressures == (5.176e-6, -5.176e-6)  # 10^(−5.286), as ⌊3801 · 0.18792…⌋ = 714
     assert scene.key == drawn_scene("drawn/4386/7").key
     assert scene.assembly_key == read_scene("4386/0107").assembly_key
+
+
+def test_the_scenes_of_a_version_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their keys are those that version 0.3.0 published."""
+    monkeypatch.setattr(problems.random_scenes, "__version__", "9.9.9")
+    lines = (PUBLISHED / "speed" / "problems.jsonl").read_text("utf-8").splitlines()
+    published = {row["scene"]: row["scene_key"] for row in map(json.loads, lines)}
+    assert len(published) == 9
+    for name, key in published.items():
+        assert read_scene(f"{name}@0.3.0").key == key
+        assert read_scene(name).key != key
+    assert drawn_names("drawn/4386/1..2@0.3.0") == ["drawn/4386/1@0.3.0", "drawn/4386/2@0.3.0"]
+    joint = "drawn/superelements/0"
+    assert read_scene(f"{joint}@9.9.9").key == read_scene(joint).key != read_scene(f"{joint}@0.3.0").key
 
 
 def test_every_parameter_is_within_its_range_and_fills_it() -> None:
