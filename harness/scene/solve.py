@@ -91,7 +91,8 @@ def solve_into(
 
         verdict = headline(record, arrays)
         if solution.stages:
-            console.print(table_of(stage_lines(record, arrays)))
+            history = stage_lines(record, arrays)
+            console.print(table_of(history))
         if allow_gap_mm is not None or allow_stress is not None:
             code = code or show_verdict(verdict["kind"], [verdict["text"]], console)
         elif stressed:
