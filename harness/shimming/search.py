@@ -13,7 +13,7 @@ made a step thinner, and the others grow; the best that is better is proven, unt
 compared by their number of shims, then by Σ t · area.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -98,11 +98,10 @@ class ShimSearch(PlanSearch):
 
     def once(self, current: Plan, count: int | None = None) -> tuple[list[Step], Step]:
         """All plans kept, and the best; the first one, without shims, if no plan keeps the limit."""
-        steps, kept, best = [self.whole((), "no shims")], list[Step](), None
-        everywhere = [tuple((k, t) for k in range(len(self.study.patches))) for t in self.stock]
-        for start in [(), *everywhere]:  # one thickness everywhere only where nothing else gets there
-            if kept or steps[0].gap_mm <= self.limit_mm:
-                break
+        steps, kept = [self.whole((), "no shims")], list[Step]()
+        if steps[0].gap_mm <= self.limit_mm:
+            return steps, steps[0]
+        for start in self._starts(steps[0]):
             grown = self.grown([(start, -1)], (), range(self.cases), (inf, inf))
             most = len(grown[0]) if grown else len(self.study.patches)
             for plan in (*grown, *self.added(start, most, self.deciding(steps[0]))):
@@ -110,10 +109,19 @@ class ShimSearch(PlanSearch):
                 if step.gap_mm > self.limit_mm and (more := self.thicker(step.plan, step.outcome)):
                     steps.append(step := self.whole(more, "growth"))  # what the estimate could not tell
                 kept += [step] if step.gap_mm <= self.limit_mm else []
+            if kept:
+                break
         best = last = min(kept, key=lambda step: self.cost(step.plan), default=None)
         while best and (best := self.better(best)):
             steps.append(last := best)
         return steps, last or steps[0]
+
+    def _starts(self, without: Step) -> Iterator[Plan]:
+        """No shims; where nothing gets there from them, the best with one thickness everywhere."""
+        yield ()
+        plans = [tuple((k, t) for k in range(len(self.study.patches))) for t in self.stock]
+        outcomes = self.outcomes(plans, self.deciding(without), ESTIMATED, ())
+        yield min(zip([self._value(one)[0] for one in outcomes], plans, strict=True))[1]
 
     def added(self, plan: Plan, most: int, cases: Sequence[int]) -> list[Plan]:
         """The plan of at most so many shims after the best change of one shim after another, until it keeps
