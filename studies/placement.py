@@ -70,13 +70,13 @@ def opened(
     fasteners = {"kind": "fasteners", "preload": preload, "pattern": {"columns": 5, "rows": 1}}
     movable = MovableFasteners.of(scene_of({"title": "", "joint": table, "effect": [gap, fasteners]}))
     gaps = random_gaps(movable.bare, cases, 0)
-    return movable, PlanSession(FastenerStudy(movable.bare, gaps, "dual", movable.fastener))
+    return movable, PlanSession(FastenerStudy(movable.bare, gaps, "dual", movable))
 
 
 def search_of(
     session: PlanSession, candidates: Plan, allowed: int, limit: float = 0.0
 ) -> tuple[Search, Counted]:
-    ask, nodes = Counted(session), session.data.assembly.contact_nodes
+    ask, nodes = Counted(session), session.last.data.assembly.contact_nodes
     assert nodes is not None
     study = session.study
     return Search(ask, study.cases.count, allowed, limit, study.bare, nodes, candidates), ask
@@ -101,8 +101,8 @@ def distances(session: PlanSession, places: Plan) -> Matrix:
     """(k, k) ‖f_a − f_b‖ in the norm of K⁻¹, √(N·mm): how different what two fasteners do is. On the
     diagonal ‖f_a‖.
     """
-    F = np.column_stack([session.column(place)[0] for place in places])
-    G = F.T @ session.data.assembly.K.solve(F)
+    F = np.column_stack([session.last.column(place)[0] for place in places])
+    G = F.T @ session.last.data.assembly.K.solve(F)
     square = np.diag(G)[:, None] + np.diag(G) - G - G.T + np.diag(np.diag(G))
     root: Matrix = np.sqrt(np.maximum(square, 0.0))
     return root

@@ -53,6 +53,46 @@ preload = 40.0
 points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]
 """
 
+POINTS = "points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]"
+STAGED = f"""
+title = "Tacked, shimmed, riveted, released"
+{two_parts()}
+{GAP}
+[[effect]]
+kind = "fasteners"
+name = "tacks"
+preload = 400.0
+{POINTS}
+[[effect]]
+kind = "shims"
+name = "shim"
+thickness = 0.02
+x = [0, 40]
+y = [0, 50]
+[[effect]]
+kind = "installed_fasteners"
+name = "rivets"
+preload = 30.0
+{POINTS}
+[[effect]]
+kind = "installed_fasteners"
+stiffness = 5e3
+approach = 0.03
+points = [[10.0, 40.0]]
+[[stage]]
+name = "tack"
+on = ["tacks"]
+[[stage]]
+name = "shim and rivet"
+on = ["shim", "rivets[0:2]"]
+[[stage]]
+name = "rivet"
+on = ["rivets[2:3]"]
+[[stage]]
+name = "release"
+off = ["tacks"]
+"""
+
 SCENE = f"""
 title = "TITLE"
 {two_parts()}

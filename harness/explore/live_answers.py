@@ -30,7 +30,7 @@ from problems.forms.assembly import DualLoadCase, LoadCase, Matrix, Vector
 from problems.input.bounded_types import valid_table
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import locked, through
+from problems.model.stage_answers import Elongations, locked, through
 from problems.model.stages import Plan
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import DualStart
@@ -66,10 +66,6 @@ class Settings:
         """The settings of a scene. Raises InputError if it has no fasteners that can move."""
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
-        if scene.stages and (len(fasteners) > 1 or any(fasteners[0]._stages)):
-            where, given = f"scene {scene.name}", [effect.name for effect in fasteners]
-            allowed = "one table, set by its name and not by a column stage: they change places"
-            raise InputError.one(where, "fasteners in stages", given, allowed)
         marks = np.concatenate([effect.marks(scene.joint) for effect in fasteners])
         means = tuple(effect.mean for effect in scene.effects_of(InitialGap))
         pressures = tuple(effect.value for effect in scene.effects_of(Pressure))
@@ -185,10 +181,10 @@ class Explorer:
             pass
         self.data = self.sessions[-1].data
 
-    def _opened(self, part: JointScene, approaches: Matrix) -> tuple[Matrix, None]:
+    def _opened(self, part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
         shared = (one for one in self.sessions if shares_stiffness(part, one.scene))
         self.sessions.append(next(shared, None) or _Session(part, self.form))
-        return np.zeros((self.scene.joint.size[0], 1)), None
+        return lambda T: np.zeros((T.shape[1], 1)), None
 
     def answer(self, settings: Settings, near: LiveAnswer | None = None) -> LiveAnswer:
         """Solve the scene with other settings, to about 1e-5 mm.
@@ -232,7 +228,7 @@ class Explorer:
         sessions, starts = iter(self.sessions), list[DualStart]()
         earlier = iter(near.starts) if near else repeat(None)
 
-        def solved(part: JointScene, approaches: Matrix) -> tuple[Matrix, LiveAnswer]:
+        def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, LiveAnswer]:
             session, start = next(sessions), next(earlier)
             load = session.load(locked(part, approaches[:, 0]).effects, start)
             lam, gap = session.solved(load, PROVEN_MM if proven else TOLERANCE_MM, start)
@@ -242,7 +238,8 @@ class Explorer:
             elif scene.stages:  # else nothing is locked
                 x = session.data.assembly.K.solve(load.f - session.data.assembly.A @ lam)
             starts.append(DualStart(load, lam, gap))
-            return session.data.assembly.at_junction(x), LiveAnswer(settings, load, lam, gap, error)
+            answer = LiveAnswer(settings, load, lam, gap, error)
+            return lambda T: T.T @ session.data.assembly.at_junction(x), answer
 
         stages = [replace(answer, stage=name) for name, _, _, answer in through(scene, solved)]
         return replace(stages[-1], stages=tuple(stages) if scene.stages else (), starts=tuple(starts))

@@ -15,6 +15,7 @@ from problems.model.effect import SpringEffect
 from problems.model.interface import on_junction
 from problems.model.positions import MOST
 from problems.model.scene import JointScene, Scene
+from problems.model.stage_answers import stage_scenes
 
 Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
@@ -27,24 +28,30 @@ DIGITS = 6  # of a place in mm: to the nanometre
 
 @dataclass(frozen=True)
 class MovableFasteners:
-    """bare : the scene without its fasteners. fastener : one of them, for its preload and the parts that it
-    joins. current : the places where the scene has them.
+    """scene : with its stages. bare : what else acts in the last one. fastener : one of them, for its preload
+    and the parts that it joins. current : the places where the scene has them.
     """
 
+    scene: JointScene
     bare: JointScene
     fastener: Fasteners
     current: Plan
 
     @classmethod
     def of(cls, scene: Scene) -> "MovableFasteners":
-        """Raises InputError as `movable_fasteners` does, and if two are at one place."""
+        """Raises InputError as `movable_fasteners` does, if two are at one place, or if a stage has only some
+        of them.
+        """
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
-        others = tuple(effect for effect in scene.effects if effect not in fasteners)
+        for name, last in stage_scenes(scene).items():
+            if (acting := list(last.effects_of(Fasteners))) and acting != fasteners:
+                allowed = f"all points at once; in stage {name} some act: they change places"
+                raise InputError.one(f"scene {scene.name}", "fasteners", [fasteners[0].name], allowed)
         marks = np.concatenate([each.marks(scene.joint) for each in fasteners])
         if twice := _twice(marks, f"scene {scene.name}"):
             raise InputError(twice)
-        return cls(replace(scene, effects=others), fasteners[0], plan_of(marks))
+        return cls(scene, without_fasteners(last), fasteners[0], plan_of(marks))
 
     def candidates(self, holes: str | None, options: TableOptions = AS_NAMED) -> tuple[Plan, Names]:
         """The holes that fasteners may go into, and their names if the CSV has a column `name`.
@@ -71,12 +78,12 @@ class MovableFasteners:
         return plan_of(points), dict(zip(places, labels, strict=False))
 
     def faults(self, points: Matrix, source: str) -> list[Fault]:
-        """One fault for each point off the parts, there twice, or where a fastener is installed."""
+        """One fault for each point off the parts, there twice, or where a fastener stays installed."""
         joint = self.bare.joint
         on = joint.covers(self.fastener.parts(joint), points)
         faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in np.flatnonzero(~on)]
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
-        for installed in self.bare.effects_of(SpringEffect):
+        for installed in () if self.scene.stages else self.bare.effects_of(SpringEffect):
             faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
         return faults + _twice(points, source)
 
@@ -88,13 +95,23 @@ def movable_fasteners(scene: Scene) -> list[Fasteners]:
         raise InputError.one(where, "assembly", "own matrices", "fasteners move on a joint only")
     fasteners = list(scene.effects_of(Fasteners))
     if not fasteners:
-        allowed = 'an [[effect]] kind = "fasteners": its preload is that of each one'
+        allowed = 'an [[effect]] kind = "fasteners", which alone move: its preload is that of each one'
         raise InputError.one(where, "effect", "no fasteners", allowed)
     for name in ("preload", "between"):
         values = [getattr(effect, name) for effect in fasteners]
         if any(value != values[0] for value in values):
             raise InputError.one(where, f"fasteners.{name}", values, "the same in all: they change places")
+    if scene.stages and (len(fasteners) > 1 or any(fasteners[0]._stages)):
+        names = [effect.name for effect in fasteners]
+        allowed = "one table, set by its name and not by a column stage: they change places"
+        raise InputError.one(where, "fasteners in stages", names, allowed)
     return fasteners
+
+
+def without_fasteners(scene: JointScene) -> JointScene:
+    """The scene without the fasteners that can move."""
+    others = tuple(effect for effect in scene.effects if not isinstance(effect, Fasteners))
+    return replace(scene, effects=others)
 
 
 def _twice(points: Matrix, source: str) -> list[Fault]:

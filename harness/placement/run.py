@@ -17,7 +17,7 @@ import pandas as pd
 from harness.measurement.scheduler import workers
 from harness.measurement.solver_descriptions import described
 from harness.placement.answer_journal import PLANS, AnswerJournal
-from harness.placement.candidates import MovableFasteners, Place, Plan
+from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
 from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.search_record import identity_of, record_of, sentence_on
@@ -31,6 +31,7 @@ from harness.scene.scene_file import MOVED, edited, with_fasteners, with_gaps
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
+from harness.series.staged import last_scene
 from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
 from problems.build import load_case, prepared
@@ -152,13 +153,14 @@ def place(
         raise InputError(faults)
     (newton,) = described([("newton", {})], None, "--solver", reporter)
     number = 1 if single else cases.count or RANDOM
-    form = chosen_form(movable.bare, newton.forms, None, number * len(holes)).form
+    form = chosen_form(movable.scene, newton.forms, None, number * len(holes)).form
 
     def cases_of(scene: Scene) -> LoadCases:
-        return Listed((load_case(scene, form),)) if single else cases.of(scene, form)
+        last = last_scene(scene)
+        return Listed((load_case(last, form),)) if single else cases.of(last, form)
 
-    study = FastenerStudy(movable.bare, cases_of(movable.bare), form, movable.fastener)
-    for sentence in (*study.bare.unusual, *study.cases.notes):
+    study = FastenerStudy(movable.bare, cases_of(movable.scene), form, movable)
+    for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
     share = share if share is not None else 1.0 if study.cases.count == 1 else 0.95
     goal = Goal(allow_gap_mm, share, count)
@@ -231,7 +233,8 @@ def _written_scene(
     scene = read_scene(str(path))
     if law is not None and law.points is not None:  # a scene has a scan, or random gaps around it
         assert isinstance(scene, JointScene)
-        scene = replace(scene, effects=(*study.bare.effects, *scene.effects_of(Fasteners)))
+        others = without_fasteners(study.scene).effects
+        scene = replace(scene, effects=(*others, *scene.effects_of(Fasteners)))
     cases = cases_of(scene)
     if result.samples and isinstance(cases, RandomGaps | ScanModes):
         cases = replace(cases, count=result.samples[-1].numbers[-1] + 1)

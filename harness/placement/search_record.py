@@ -20,8 +20,8 @@ def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goa
     return {
         **asdict(goal),
         **{name: f"{counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
-        "scene_key": study.bare.key,
-        "fastener": study.fastener.model_dump(mode="json", include={"preload", "between"}),
+        "scene_key": study.scene.key,
+        "fastener": study.movable.fastener.model_dump(mode="json", include={"preload", "between"}),
         "cases_key": study.cases.key,
         "cases": study.cases.count,
         "form": study.form,
@@ -33,6 +33,7 @@ def record_of(
     study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal, result: Found, nodes: Matrix
 ) -> dict[str, Any]:
     """The content of place.json."""
+    scene = study.scene
 
     def entry(step: Step, numbers: Sequence[int] = result.numbers) -> dict[str, Any]:
         limit = float("inf") if goal.limit_mm is None else goal.limit_mm
@@ -47,11 +48,12 @@ def record_of(
         }
 
     return {
-        "scene": study.bare.name,
-        "title": study.bare.title,
+        "scene": scene.name,
+        "title": scene.title,
         "cases": len(result.numbers),
         "chosen_by_share": 1 - goal.allowed(len(result.numbers)) / len(result.numbers),
-        "preload": study.fastener.preload,
+        "preload": study.movable.fastener.preload,
+        "stages": [stage.name for stage in scene.stages],
         **asdict(goal),
         "confidence": CONFIDENCE,
         "samples": [
@@ -65,7 +67,7 @@ def record_of(
         "steps": [entry(step) for step in result.steps],
         "best": None if result.best is None else entry(result.best),
         "order": [entry(step) for step in result.order],
-        "scene_key": study.bare.key,
+        "scene_key": scene.key,
         "version": installed_version("rivetbench"),
         **provenance(),
     }

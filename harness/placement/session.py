@@ -1,24 +1,28 @@
-"""The largest gap that plans leave in each load case, computed in one process.
+"""The largest gap that plans leave in each load case after the last stage, computed in one process.
 
 A plan is a set of items, fasteners or shims. An item z adds f_z to the forces f₀ of the scene without any,
-g_z to its gaps, and u_z = AᵀK⁻¹f_z − g_z to its overlap p₀:
+g_z to its gaps, and u_z = AᵀK⁻¹f_z − g_z to its overlap p₀, in each stage that has the items. The approaches
+a that earlier stages have locked add to both by springs of directions T and stiffnesses k:
 
-    f = f₀ + Σ f_z,   g = g₀ + Σ g_z,   p = p₀ + Σ u_z,
+    f = f₀ + Σ f_z + T(k a),   g = g₀ + Σ g_z,   p = p₀ + Σ u_z + AᵀK⁻¹T(k a),
 
-so that a plan costs no more than its contact problems. Active-set Newton solves each from the answer of
-another plan in the same load case: most contacts have the same state.
+so that a plan costs no more than its contact problems: that of the last stage, and those of the stages in
+which fasteners lock what they find. Active-set Newton solves each from the answer of another plan in the same
+stage and load case: most contacts have the same state.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from uuid import uuid4
 
 import numpy as np
+import scipy.sparse as sp
 import threadpoolctl
 
-from harness.placement.candidates import Place, Plan
+from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
+from harness.series.staged import OpenStage, OpenStages, StageCases
 from harness.solving.call_lock import in_turn
 from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM
@@ -30,6 +34,7 @@ from problems.forms.assembly import Assembly, DualLoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
 from problems.model.effect import Effect
 from problems.model.scene import JointScene
+from problems.model.stage_answers import Elongations, through
 from solvers.algorithms.newton_sweeps import Case, Sweeps
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
@@ -40,12 +45,21 @@ POWER = 8  # of the mean of gaps that stands for the largest one where that does
 
 @dataclass(frozen=True)
 class Study(ABC):
-    """The scene without the items of a plan, and its load cases."""
+    """What acts in the last stage of a scene but the items of a plan, and its load cases."""
 
     bare: JointScene
     cases: LoadCases
     form: Form
     key: str = field(default_factory=lambda: uuid4().hex, kw_only=True)
+
+    @property
+    def scene(self) -> JointScene:
+        """The scene whose stages a plan goes through."""
+        return self.bare
+
+    def bare_stage(self, part: JointScene, plan: Plan) -> tuple[JointScene, Plan]:
+        """What acts in a stage but the items, and the items that do."""
+        return part, plan
 
     @abstractmethod
     def effect(self, item: Place) -> Effect:
@@ -60,12 +74,19 @@ class Study(ABC):
 
 @dataclass(frozen=True)
 class FastenerStudy(Study):
-    """fastener : one of those that are left out of the scene."""
+    """Some stages have the fasteners."""
 
-    fastener: Fasteners
+    movable: MovableFasteners
+
+    @property
+    def scene(self) -> JointScene:
+        return self.movable.scene
+
+    def bare_stage(self, part: JointScene, plan: Plan) -> tuple[JointScene, Plan]:
+        return without_fasteners(part), plan if any(part.effects_of(Fasteners)) else ()
 
     def effect(self, item: Place) -> Fasteners:
-        return self.fastener.model_copy(update={"points": (item,), "pattern": None})
+        return self.movable.fastener.model_copy(update={"points": (item,), "pattern": None})
 
 
 @dataclass(frozen=True)
@@ -93,76 +114,156 @@ class Outcome:
     further: tuple[tuple[float, ...], ...] = ()
 
 
-class PlanSession:
-    """Answers questions of one study; its matrices are made once."""
+class StiffnessSession:
+    """What stages with the same K share; its matrices are made once. scene : one of these stages."""
 
-    def __init__(self, study: Study) -> None:
-        threadpoolctl.threadpool_limits(THREADS)
-        self.study = study
-        self.data = prepared(study.bare, form=study.form)
+    def __init__(self, study: Study, scene: JointScene) -> None:
+        self.study, self.scene = study, scene
+        self.data = prepared(scene, form=study.form)
         self.sweeps = Sweeps(self.data)
         self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
-        self.loads: dict[int, DualLoadCase] = {}
         self.columns: dict[Place, tuple[Vector, Vector, Vector]] = {}
-        self.starts = lru_cache(4)(lambda base, k: self.sweeps.together(self._loads(base, k), ESTIMATE_MM))
-
-    def answer(self, question: Question) -> list[Outcome]:
-        """The outcome of each plan, the same to the last bit whatever was answered before."""
-        starts = [] if question.base is None else self.starts(question.base, question.cases)
-        return [self._outcome(self._loads(plan, question.cases), starts) for plan in question.plans]
-
-    def gaps(self, numbers: Sequence[int]) -> Matrix:
-        """An estimate of the gaps (m, k) that no item leaves in some cases, mm."""
-        cases = self.sweeps.together(self._loads((), numbers), ESTIMATE_MM)
-        return np.column_stack([self.sweeps.vectors(case)[1] for case in cases])
-
-    def _outcome(self, loads: list[DualLoadCase], starts: list[Case]) -> Outcome:
-        """starts : one for each case of an estimate; none: it is proven."""
-        if starts:
-            cases = self.sweeps.together(loads, ESTIMATE_MM, starts)
-            lams, ys = zip(*map(self.sweeps.vectors, cases), strict=True)
-            xs = [partial(self.data.recover, *pair) for pair in zip(lams, loads, strict=True)]
-            gaps, errors, bounds = np.column_stack(ys), np.zeros(len(loads)), [0.0] * len(loads)
-        else:
-            answers, errors = self._proven(loads, self.sweeps.together(loads, TOLERANCE_MM))
-            xs = [partial(np.asarray, answer.x) for answer in answers]
-            gaps, bounds = np.column_stack([a.gap for a in answers]), [a.bound_mm for a in answers]
-        largest = gaps.max(axis=0) + errors
-        mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
-        further = tuple(
-            filter(None, map(partial(self.study.further, self.data.assembly), (gaps + errors).T, xs, bounds))
-        )
-        at = gaps.argmax(axis=0)
-        return Outcome(tuple(largest.tolist()), tuple(at.tolist()), tuple(mean.tolist()), further)
-
-    def _proven(self, loads: list[DualLoadCase], cases: list[Case]) -> tuple[list[Assessment], Vector]:
-        """The answers, and how far the largest gap of each may be off (k,), mm."""
-        lams = [self.sweeps.vectors(case)[0] for case in cases]
-        assessed = assess(self.proof, loads, lams, [None] * len(loads), ENOUGH_MM)
-        errors = [
-            self.gap_error(load.g, answer.x, answer.bound_mm).max(initial=0.0)
-            for load, answer in zip(loads, assessed, strict=True)
-        ]
-        return assessed, np.array(errors)
-
-    def _loads(self, plan: Plan, numbers: Sequence[int]) -> list[DualLoadCase]:
-        new = [k for k in numbers if k not in self.loads]
-        if new:
-            made = self.data.with_p([self.study.cases.load(k) for k in new])
-            self.loads |= dict(zip(new, made, strict=True))
-        f = self.loads[numbers[0]].f.copy()
-        g, u = np.zeros((2, self.data.assembly.m))
-        for item in plan:
-            force, gap, overlap = self.column(item)
-            f, g, u = f + force, g + gap, u + overlap
-        return [DualLoadCase(f, self.loads[k].g + g, self.loads[k].p + u) for k in numbers]
+        self.of_springs: dict[bytes, tuple[Matrix, Matrix]] = {}
 
     def column(self, item: Place) -> tuple[Vector, Vector, Vector]:
         """f_z (n,) N, g_z and u_z (m,) mm."""
         if item not in self.columns:
-            load = load_case(self.study.bare, self.study.form, [self.study.effect(item)])
+            load = load_case(self.scene, self.study.form, [self.study.effect(item)])
             self.columns[item] = load.f, load.g, self.data.overlap(load) if load.f.any() else -load.g
         return self.columns[item]
+
+    def springs(self, T: sp.csc_array) -> tuple[Matrix, Matrix]:
+        """K⁻¹T (n, r) and AᵀK⁻¹T (m, r), mm/N, of directions at the junction."""
+        key = T.indices.tobytes() + T.data.tobytes()
+        if key not in self.of_springs:
+            x = self.data.assembly.K.solve(self.data.assembly.from_junction(T.toarray()))
+            self.of_springs[key] = x, self.data.assembly.A.T @ x
+        return self.of_springs[key]
+
+
+@dataclass(eq=False)
+class StageAnswers:
+    """The answers to load cases of one stage, made when they are needed.
+
+    near : those of another plan, from which these are estimated; None: these are accurate. locks : whether
+    fasteners have locked what these have reached.
+    """
+
+    session: StiffnessSession
+    loads: list[DualLoadCase]
+    tolerance: float
+    near: "StageAnswers | None" = None
+    locks: bool = False
+
+    @cached_property
+    def cases(self) -> list[Case]:
+        starts = self.near.cases if self.near else ()
+        return self.session.sweeps.together(self.loads, self.tolerance, starts)
+
+    @cached_property
+    def vectors(self) -> tuple[Matrix, Matrix]:
+        """λ (m, k) N and the gaps (m, k) mm."""
+        lams, gaps = zip(*map(self.session.sweeps.vectors, self.cases), strict=True)
+        return np.column_stack(lams), np.column_stack(gaps)
+
+    @cached_property
+    def proven(self) -> list[Assessment]:
+        lams = list(self.vectors[0].T)
+        return assess(self.session.proof, self.loads, lams, [None] * len(lams), ENOUGH_MM)
+
+    def elongations(self, T: sp.csc_array) -> Matrix:
+        """Tᵀx = (K⁻¹T)ᵀf − (AᵀK⁻¹T)ᵀλ, (r, k) mm."""
+        self.locks = True
+        x, overlap = self.session.springs(T)
+        return x.T @ np.column_stack([load.f for load in self.loads]) - overlap.T @ self.vectors[0]
+
+
+class PlanSession:
+    """Answers questions of one study; its matrices are made once. last : of the last stage."""
+
+    def __init__(self, study: Study) -> None:
+        threadpoolctl.threadpool_limits(THREADS)
+        self.study = study
+        self.stages = OpenStages(study.bare, study.form, partial(StiffnessSession, study))
+        self.last = self.stages.of(study.bare).session
+        self.loads: dict[tuple[OpenStage[StiffnessSession], int], DualLoadCase] = {}
+        self.starts = lru_cache(4)(partial(self.answers, tolerance=ESTIMATE_MM))
+
+    def answer(self, question: Question) -> list[Outcome]:
+        """The outcome of each plan, the same to the last bit whatever was answered before."""
+        starts = [] if question.base is None else self.starts(question.base, question.cases)
+        return [self._outcome(plan, question.cases, starts) for plan in question.plans]
+
+    def gaps(self, numbers: Sequence[int]) -> Matrix:
+        """An estimate of the gaps (m, k) that no item leaves in some cases, mm."""
+        return self.answers((), numbers, ESTIMATE_MM)[-1].vectors[1]
+
+    def _outcome(self, plan: Plan, numbers: Sequence[int], starts: list[StageAnswers]) -> Outcome:
+        """starts : one for each stage of an estimate; none: it is proven."""
+        stages = self.answers(plan, numbers, ESTIMATE_MM if starts else TOLERANCE_MM, starts)
+        last, data, errors = stages[-1], self.last.data, np.zeros(len(numbers))
+        if starts:
+            lams, gaps = last.vectors
+            xs = [partial(data.recover, *pair) for pair in zip(lams.T, last.loads, strict=True)]
+            bounds = [0.0] * len(xs)
+        else:
+            errors = self._errors(stages)
+            xs = [partial(np.asarray, answer.x) for answer in last.proven]
+            gaps, bounds = np.column_stack([a.gap for a in last.proven]), [a.bound_mm for a in last.proven]
+        largest = gaps.max(axis=0) + errors
+        mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
+        further = tuple(
+            filter(None, map(partial(self.study.further, data.assembly), (gaps + errors).T, xs, bounds))
+        )
+        at = gaps.argmax(axis=0)
+        return Outcome(tuple(largest.tolist()), tuple(at.tolist()), tuple(mean.tolist()), further)
+
+    @staticmethod
+    def _errors(stages: list[StageAnswers]) -> Vector:
+        """(k,) how far the largest gap of the last stage may be off, mm: infinitely if a stage in which
+        fasteners lock is not proven to within the limit.
+        """
+        last = stages[-1]
+        pairs = zip(last.loads, last.proven, strict=True)
+        errors = [last.session.gap_error(b.g, a.x, a.bound_mm).max(initial=0.0) for b, a in pairs]
+        bounds = [[answer.bound_mm for answer in one.proven] for one in stages if one.locks]
+        return np.where((np.array(bounds).reshape(-1, len(errors)) > LIMIT_MM).any(axis=0), np.inf, errors)
+
+    def answers(
+        self, plan: Plan, numbers: Sequence[int], tolerance: float, starts: Sequence[StageAnswers] = ()
+    ) -> list[StageAnswers]:
+        """The answers of a plan in each problem of `through`; the last one is that of the last stage."""
+        made: list[StageAnswers] = []
+
+        def solve(part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
+            session, loads = self._loads(part, plan, numbers, approaches)
+            made.append(StageAnswers(session, loads, tolerance, starts[len(made)] if starts else None))
+            return made[-1].elongations, None
+
+        for _ in through(self.study.scene, solve, len(numbers)):
+            pass
+        return made
+
+    def _loads(
+        self, part: JointScene, plan: Plan, numbers: Sequence[int], approaches: Matrix
+    ) -> tuple[StiffnessSession, list[DualLoadCase]]:
+        """The load cases in a stage, a scene whose springs have approaches (r, k) mm, and the session."""
+        bare, items = self.study.bare_stage(part, plan)
+        stage = self.stages.of(bare)
+        session, cases = stage.session, StageCases(self.study.cases, stage.f, stage.gap_change, {})
+        if new := [k for k in numbers if (stage, k) not in self.loads]:
+            made = session.data.with_p([cases.load(k) for k in new])
+            self.loads |= {(stage, k): load for k, load in zip(new, made, strict=True)}
+        f, (g, u) = stage.f, np.zeros((2, session.data.assembly.m))
+        for item in items:
+            force, gap, overlap = session.column(item)
+            f, g, u = f + force, g + gap, u + overlap
+        forces = f[:, None] + stage.locking(session.data.assembly, approaches)
+        overlaps = np.repeat(u[:, None], len(numbers), axis=1)
+        if stage.springs:
+            overlaps += session.springs(stage.springs.T)[1] @ (stage.springs.k[:, None] * approaches)
+        loads = zip(forces.T, overlaps.T, (self.loads[stage, k] for k in numbers), strict=True)
+        return session, [DualLoadCase(f, load.g + g, load.p + u) for f, u, load in loads]
 
 
 _sessions: dict[str, PlanSession] = {}  # the only one of this process, so that it opens the assembly once

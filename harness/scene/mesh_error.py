@@ -30,7 +30,7 @@ from problems.model.effect import GapEffect
 from problems.model.joint import Extension, Joint, Part
 from problems.model.junction_terms import junction_load
 from problems.model.scene import JointScene
-from problems.model.stage_answers import locked, through
+from problems.model.stage_answers import Elongations, locked, through
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,8 @@ def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector
     scene: Any = solution.scene
     here, other = scene.joint, replace(scene, joint=joint)
 
-    def answer(part: JointScene, approaches: Matrix) -> tuple[Vector, tuple[Vector, JointScene, Vector]]:
-        """x of a stage on the other mesh; its gaps, its scene, and û."""
+    def answer(part: JointScene, approaches: Matrix) -> tuple[Elongations, tuple[Vector, JointScene, Vector]]:
+        """Elongations of a stage on the other mesh; its gaps, its scene, and û."""
         gaps = [effect for effect in part.effects if isinstance(effect, GapEffect)]
         rest = [effect for effect in part.effects if not isinstance(effect, GapEffect)]
         one = locked(replace(part, effects=tuple(rest)), approaches[:, 0])
@@ -128,7 +128,7 @@ def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector
             raise InputError.one(other.name, "mesh", list(joint.junction.nodes), "one with an answer")
         A = data.assembly.A
         x = data.assembly.K.solve(load.f - A @ lam)
-        return data.assembly.at_junction(x), (load.g - A.T @ x, one, x)
+        return lambda T: T.T @ data.assembly.at_junction(x), (load.g - A.T @ x, one, x)
 
     *_, (_, _, _, (gap, last, x)) = through(other, answer)
     nodes = min(here.nodes, joint.nodes, key=len)

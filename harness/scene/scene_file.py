@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,9 @@ def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequ
 
 
 def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], None]:
-    """The change that moves all fasteners of a scene to these places, mm; none leaves it without."""
+    """The change that moves all fasteners of a scene to these places, mm; none leaves it and its stages
+    without.
+    """
 
     def change(document: Any) -> None:
         tables = of_kind(document, "fasteners")
@@ -57,6 +60,10 @@ def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], Non
             tables[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
         for other in tables[1 if points else 0 :]:
             document["effect"].remove(other)
+        names = [] if points else [table.get("name") for table in tables]
+        for stage, key in product(document.get("stage", []), ("on", "off")):
+            if set(names).intersection(stage.get(key, [])):
+                stage[key] = [name for name in stage[key] if name not in names]
 
     return change
 
@@ -66,7 +73,7 @@ def with_gaps(cases: RandomGaps) -> Callable[[Any], None]:
     table: dict[str, Any] = cases.field.model_dump(mode="json", exclude={"kind"}, exclude_none=True)
     kind = "initial_gap"
     if cases.points is not None:
-        kind, table = "measured_gap", {key: table[key] for key in ("between",) if key in table}
+        kind, table = "measured_gap", {key: table[key] for key in ("between", "name") if key in table}
         table["points"] = tomlkit.item(cases.points.tolist()).multiline(True)
 
     def change(document: Any) -> None:

@@ -18,7 +18,7 @@ from problems.errors import InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Matrix, Vector
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import locked, through
+from problems.model.stage_answers import Elongations, locked, through
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene, scene_of
 from solvers.base import Answer, Solver
@@ -205,10 +205,11 @@ def solve(
     if not (isinstance(scene, JointScene) and scene.stages):
         return answered(scene)
 
-    def of_stage(part: JointScene, approaches: Matrix) -> tuple[Vector, Solution]:
+    def of_stage(part: JointScene, approaches: Matrix) -> tuple[Elongations, Solution]:
         clock.where = f"{part.title}: "
         answer = answered(locked(part, approaches[:, 0]))
-        return answer.problem.prepared.assembly.at_junction(answer.problem.reference.x), answer
+        x = answer.problem.prepared.assembly.at_junction(answer.problem.reference.x)
+        return lambda T: T.T @ x, answer
 
     history = []
     for name, part, approaches, answer in through(scene, of_stage):

@@ -1,26 +1,29 @@
 """Takes each load case of a series through the stages of its scene, a block of cases at a time.
 
-The cases are those of the last stage. In stage s case k has the forces f_k + f_s − f + T(k a_k) and the gaps
-g_k + g_s − g, with f and g of the last stage, f_s without approaches, and a_k what the fasteners of s have
-locked in this case. Stages with the same K share its factors and the state of the solver.
+The cases are those of the last stage, and differ in their gaps. In stage s case k has the gaps g_k + g_s − g
+and the forces f_s + T(k a_k), with g of the last stage, f_s without approaches, and a_k what the fasteners of
+s have locked in this case. Stages with the same K share its factors and the state of the solver.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from problems.build import load_case, shares_stiffness
 from problems.errors import InputError
 from problems.forms import Form
-from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.springs import Springs
-from problems.model.stage_answers import locked, stage_scenes, through
+from problems.model.stage_answers import Elongations, locked, stage_scenes, through
 
-from .session import BLOCK, Attempt, Job, Result, SeriesSession
+from .session import BLOCK, Job, Result, SeriesSession
+
+S = TypeVar("S")
 
 RANDOM = ("initial_gap", "measured_gap")  # what the cases of a series replace
 
@@ -43,12 +46,14 @@ def last_scene(scene: Scene) -> Scene:
 class StageCases(LoadCases):
     """The load cases of one stage.
 
-    of_last : those of the last stage. change : of f and g from the last stage to this one. locking : the
-    forces of the locked approaches, (n,) N by the number of the case; none without installed fasteners.
+    of_last : those of the last stage. f : of this stage, without approaches, (n,) N. gap_change : from the
+    last stage to this one, (m,) mm. locking : the forces of the locked approaches, (n,) N by the number of
+    the case; none without installed fasteners.
     """
 
     of_last: LoadCases
-    change: LoadCase
+    f: Vector
+    gap_change: Vector
     locking: dict[int, Vector]
 
     @property
@@ -56,28 +61,59 @@ class StageCases(LoadCases):
         return self.of_last.key
 
     def load(self, k: int) -> LoadCase:
-        load = self.of_last.load(k)
-        f = load.f + self.change.f if self.change.f.any() else load.f
-        return LoadCase(f + self.locking[k] if self.locking else f, load.g + self.change.g)
+        f = self.f + self.locking[k] if self.locking else self.f
+        return LoadCase(f, self.of_last.load(k).g + self.gap_change)
 
     def parameters(self, k: int) -> dict[str, float | str]:
         return self.of_last.parameters(k)
+
+
+@dataclass(frozen=True, eq=False)
+class OpenStage(Generic[S]):
+    """What the load cases of a stage share: its scene, the session of its K, f without approaches (n,) N, the
+    change of the gap from the last stage (m,) mm, and its springs.
+    """
+
+    scene: JointScene
+    session: S
+    f: Vector
+    gap_change: Vector
+    springs: Springs
+
+    def locking(self, assembly: Assembly, approaches: Matrix) -> Matrix:
+        """T(k a) (n, cases) N, the forces of approaches (r, cases) mm."""
+        return assembly.from_junction(self.springs.T @ (self.springs.k[:, None] * approaches))
+
+
+class OpenStages(Generic[S]):
+    """The stages opened so far, each once; those with the same K share a session, which `make` makes.
+
+    last : what acts in the last stage.
+    """
+
+    def __init__(self, last: JointScene, form: Form, make: Callable[[JointScene], S]) -> None:
+        self.form, self.make, self.gap = form, make, load_case(last, form).g
+        self.stages: dict[str, OpenStage[S]] = {}
+
+    def of(self, part: JointScene) -> OpenStage[S]:
+        """The stage in which `part` acts, a scene without stages."""
+        if (key := part.key) not in self.stages:
+            shared = (one.session for one in self.stages.values() if shares_stiffness(part, one.scene))
+            session, springs = next(shared, None) or self.make(part), Springs.of(part)
+            load = load_case(part, self.form, locked(part, np.zeros(len(springs.k))).effects)
+            self.stages[key] = OpenStage(part, session, load.f, load.g - self.gap, springs)
+        return self.stages[key]
 
 
 class StagedSession:
     """A job in this process, as `SeriesSession`, whose scene has stages."""
 
     def __init__(self, job: Job) -> None:
+        last = last_scene(job.scene)
         assert isinstance(job.scene, JointScene)
+        assert isinstance(last, JointScene)
         self.job, self.scene = job, job.scene
-        self.sessions: list[SeriesSession] = []
-        self.last = load_case(last_scene(job.scene), job.form)
-
-    @staticmethod
-    def _load(scene: Scene, form: Form) -> LoadCase:
-        """f and g of a scene without stages whose springs have no approach."""
-        assert isinstance(scene, JointScene)
-        return load_case(locked(scene, np.zeros(len(Springs.of(scene).k))), form)
+        self.stages = OpenStages(last, job.form, lambda part: SeriesSession(replace(job, scene=part)))
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
         """The results of the cases with these numbers, a block at a time."""
@@ -85,7 +121,7 @@ class StagedSession:
             yield self._through(numbers[start : start + BLOCK])
 
     def _through(self, block: Sequence[int]) -> list[Result]:
-        def solved(part: JointScene, approaches: Matrix) -> tuple[Matrix, tuple[list[Attempt], list[Result]]]:
+        def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, list[Result]]:
             session = self._session(part, approaches, block)
             attempts = [attempt for some in session.attempted(block) for attempt in some]
             assessed = session.assessed(attempts)
@@ -93,28 +129,19 @@ class StagedSession:
             for column, case in enumerate(block):
                 if case in assessed:
                     x[:, column] = session.data.assembly.at_junction(assessed[case].x)
-            return x, (attempts, session.results(attempts, assessed))
+            return lambda T: T.T @ x, session.results(attempts, assessed)
 
-        history = [(name, results) for name, _, _, (_, results) in through(self.scene, solved, len(block))]
+        history = [(name, results) for name, _, _, results in through(self.scene, solved, len(block))]
         return [self._result([(name, results[k]) for name, results in history]) for k in range(len(block))]
 
     def _session(self, part: JointScene, approaches: Matrix, block: Sequence[int]) -> SeriesSession:
         """The session of K of a stage, with the load cases of the stage."""
-        shared = (one for one in self.sessions if shares_stiffness(part, one.job.scene))
-        session = next(shared, None)
-        if session is None:
-            session = SeriesSession(replace(self.job, scene=part))
-            self.sessions.append(session)
-        here, springs, junction = (
-            self._load(part, self.job.form),
-            Springs.of(part),
-            session.data.assembly.junction,
-        )
-        locking = np.zeros((len(here.f), len(block)))
-        locking[slice(None) if junction is None else junction] = springs.T @ (springs.k[:, None] * approaches)
-        forces = dict(zip(block, np.ascontiguousarray(locking.T), strict=True)) if springs else {}
-        change = LoadCase(here.f - self.last.f, here.g - self.last.g)
-        cases = StageCases(self.job.cases, change, forces)
+        stage = self.stages.of(part)
+        session, forces = stage.session, dict[int, Vector]()
+        if stage.springs:
+            locking = stage.locking(session.data.assembly, approaches)
+            forces = dict(zip(block, np.ascontiguousarray(locking.T), strict=True))
+        cases = StageCases(self.job.cases, stage.f, stage.gap_change, forces)
         session.job = replace(self.job, scene=part, cases=cases)
         return session
 

@@ -19,7 +19,7 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import locked, stage_scenes, through
+from problems.model.stage_answers import Elongations, locked, stage_scenes, through
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
@@ -139,10 +139,11 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
         return scene
     form, like = form_of_stages(scene), None
 
-    def solve(part: JointScene, approaches: Matrix) -> tuple[Vector, None]:
+    def solve(part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
         nonlocal like
         like = open_stage(locked(part, approaches[:, 0]), form, limit_s=limit_s, like=like)
-        return like.prepared.assembly.at_junction(like.reference.x), None
+        x = like.prepared.assembly.at_junction(like.reference.x)
+        return lambda T: T.T @ x, None
 
     def made() -> storage.Entry:
         *_, (_, _, approaches, _) = through(scene, solve)

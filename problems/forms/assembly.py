@@ -70,6 +70,12 @@ class Assembly:
         """The rows that belong to the junction, of an array (n,) or (n, k), dense or sparse; None of None."""
         return rows if rows is None or self.junction is None else rows[self.junction]
 
+    def from_junction(self, rows: Matrix) -> Matrix:
+        """(n, k) the rows of the junction's displacements (·, k) among all unknowns; the others are zero."""
+        everywhere = np.zeros((self.n, rows.shape[1]))
+        everywhere[slice(None) if self.junction is None else self.junction] = rows
+        return everywhere
+
     @property
     def contact_nodes(self) -> Matrix | None:
         """(m, 2) coordinates of the contacts, mm, if they are known."""

@@ -9,9 +9,10 @@ springs. Without a preload they are free of force in s, whose answer is then the
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
@@ -21,10 +22,12 @@ from .scene import JointScene
 from .stages import Acting, Elements, Plan, acting_effects, of_effect
 
 Answer = TypeVar("Answer")
+#: Of an answer x (n, k), mm: Tᵀx (r, k) for directions T (n, r).
+Elongations: TypeAlias = Callable[[sp.csc_array], Matrix]
 
 
 def through(
-    scene: JointScene, solve: Callable[[JointScene, Matrix], tuple[Matrix, Answer]], cases: int = 1
+    scene: JointScene, solve: Callable[[JointScene, Matrix], tuple[Elongations, Answer]], cases: int = 1
 ) -> Iterator[tuple[str, JointScene, Matrix, Answer]]:
     """Go through the stages of a scene, one after another.
 
@@ -33,8 +36,8 @@ def through(
     scene : JointScene
         With stages; without, it is one stage.
     solve : function
-        Answers a scene without stages whose springs have the approaches (r, cases), mm: returns x (n,) or
-        (n, cases) mm, of which fasteners lock their approach, and the answer to hand on.
+        Answers a scene without stages whose springs have the approaches (r, cases), mm: returns the function
+        from T to Tᵀx, called if fasteners lock their approach, and the answer to hand on.
     cases : int
         The number of load cases. Each has approaches of its own.
 
@@ -51,7 +54,7 @@ def through(
         rows = [at[:, of_effect(number, elements)].reshape(-1, cases) for number, at in locks.items()]
         return _scene(scene, step, elements), np.concatenate([np.zeros((0, cases)), *rows])
 
-    def answered(step: Acting, part: JointScene, approaches: Matrix) -> tuple[Matrix, Answer]:
+    def answered(step: Acting, part: JointScene, approaches: Matrix) -> tuple[Elongations, Answer]:
         try:
             return solve(part, approaches)
         except InputError as error:
@@ -61,18 +64,18 @@ def through(
     for step in steps:
         fresh = frozenset((number, k) for number, k in step.fresh if number in locks)
         part, approaches = assembled(step, step.elements - fresh)
-        x, answer = answered(step, part, approaches)
+        elongations, answer = answered(step, part, approaches)
         again = step is last
         for number in sorted({number for number, _ in fresh}):
             effect, elements = scene.effects[number], of_effect(number, fresh)
             assert isinstance(effect, SpringEffect)
             T, _ = effect.springs(joint)
-            reached = (T.T @ x.reshape(-1, cases)).reshape(locks[number].shape)
+            reached = elongations(T).reshape(locks[number].shape)
             locks[number][:, elements] = reached[:, elements]
             again = again or effect.preload != 0
         if fresh:
             part, approaches = assembled(step, step.elements)
-            _, answer = answered(step, part, approaches) if again else (x, answer)
+            _, answer = answered(step, part, approaches) if again else (elongations, answer)
         yield step.name, part, approaches, answer
 
 

@@ -65,8 +65,9 @@ def _summary(record: dict[str, Any]) -> Table:
     best, limit = record["best"], record["limit_mm"]
     share = f"{100 * record['share']:.4g} % of the cases"
     asked = f"the best {record['count']}" if record["count"] else f"the fewest that leave {limit:g} mm"
+    after = f", after stage {record['stages'][-1]}" if record["stages"] else ""
     facts = {
-        "asked for": f"{asked} in {share}",
+        "asked for": f"{asked} in {share}{after}",
         "candidates": f"{len(record['candidates'])} holes, {significant(record['preload'])} N each",
         "found": record["said"],
     }

@@ -50,7 +50,7 @@ class Told(Reporter):
 def study_of(path: Path, cases: int = 6) -> FastenerStudy:
     movable = MovableFasteners.of(read_scene(str(path)))
     gaps = random_gaps(movable.bare, cases, 0)
-    return FastenerStudy(movable.bare, gaps, "dual", movable.fastener)
+    return FastenerStudy(movable.bare, gaps, "dual", movable)
 
 
 def plans_of(path: Path, rows: int, columns: int) -> Plan:
@@ -84,8 +84,8 @@ def test_doubt_counts_against_a_plan(session: PlanSession, monkeypatch: pytest.M
     """Its largest gap is no less than the proven upper bound of any."""
     question = Question((((33.0, 12.5),),), (0, 1))
     (sure,) = session.answer(question)
-    m = session.data.assembly.m
-    monkeypatch.setattr(session, "gap_error", lambda *_: np.linspace(0.0, 1e-3, m))
+    m = session.last.data.assembly.m
+    monkeypatch.setattr(session.last, "gap_error", lambda *_: np.linspace(0.0, 1e-3, m))
     (unsure,) = session.answer(question)
     np.testing.assert_allclose(np.subtract(unsure.largest, sure.largest), 1e-3, rtol=0.01)
 
@@ -104,7 +104,7 @@ def test_an_outcome_is_that_of_its_question_alone(strip: Path, session: PlanSess
 
 
 def searched(session: PlanSession, limit: float, candidates: Plan, allowed: int = 0) -> Search:
-    nodes = session.data.assembly.contact_nodes
+    nodes = session.last.data.assembly.contact_nodes
     assert nodes is not None
     bare, count = session.study.bare, session.study.cases.count
     answers = lambda questions: [session.answer(q) for q in questions]  # noqa: E731
@@ -563,6 +563,6 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
     movable = MovableFasteners.of(read_scene(str(path)))
-    study = FastenerStudy(movable.bare, Listed((load_case(movable.bare),)), "dual", movable.fastener)
+    study = FastenerStudy(movable.bare, Listed((load_case(movable.bare),)), "dual", movable)
     (found,) = PlanSession(study).answer(Question((movable.current,), (0,)))
     assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)

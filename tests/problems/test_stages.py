@@ -16,7 +16,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Matrix
 from problems.model.scene import JointScene
-from problems.model.stage_answers import locked, stage_scenes, through
+from problems.model.stage_answers import Elongations, locked, stage_scenes, through
 from problems.scene_files import read_scene, scene_of
 
 Tables = dict[str, Any]
@@ -193,9 +193,13 @@ def test_many_cases_go_through_at_once() -> None:
         [CLAMP, {"name": "1", "on": ["rivets[0:2]"]}, RELEASE, {"name": "2", "on": ["rivets[2:4]"]}]
     )
 
-    def solved(part: JointScene, approaches: Matrix) -> tuple[Matrix, int]:
+    def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, int]:
         answers = [solve(heavier(locked(part, column), k)).x for k, column in enumerate(approaches.T)]
-        return np.column_stack(answers), approaches.shape[1]
+        return lambda T: T.T @ np.column_stack(answers), approaches.shape[1]
+
+    def solved_alone(part: JointScene) -> tuple[Elongations, int]:
+        x = solve(part).x
+        return lambda T: T.T @ x, 0
 
     def heavier(part: JointScene, k: int) -> JointScene:
         gap = part.effects[0].model_copy(update={"mean": 0.5 + 0.1 * k})
@@ -203,7 +207,7 @@ def test_many_cases_go_through_at_once() -> None:
 
     *_, (_, _, both, _) = through(scene, solved, 2)
     for k in range(2):
-        *_, (_, _, one, _) = through(heavier(scene, k), lambda part, at: (solve(locked(part, at[:, 0])).x, 0))
+        *_, (_, _, one, _) = through(heavier(scene, k), lambda part, at: solved_alone(locked(part, at[:, 0])))
         np.testing.assert_allclose(both[:, k], one[:, 0], atol=1e-10)
     assert abs(np.diff(both)).max() > 0.01
 
