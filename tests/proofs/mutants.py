@@ -171,7 +171,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "max(1.0, KEPT * kappa)": ("1.0",),
         "C = C ^ wrong": ("C = C | wrong",),
         "-self.rho * gap, -lam)": ("0 * gap, -lam)", "-self.rho * gap, 0 * lam)"),
-        "return self.K.solve(b)": ("return 2 * self.K.solve(b)",),
+        "springs.sprung.factor(np.where(C, self.rho, 0.0))": ("springs.sprung.factor(0.0 * y)",),
     },
     "harness/verification/feasible_push.py": {
         "least, opening = s - error,": ("least, opening = s,",),
