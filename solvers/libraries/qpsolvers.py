@@ -23,7 +23,7 @@ TINY = float(np.finfo(float).tiny)
 #: Options that set the absolute tolerance, and that of the duality gap. Relative tolerances are 0, iteration
 #: limits too large to matter. DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes none
 #: below 1e-10; by default it adds 1e-7 to the diagonal of P, which with eigenvalues of Q near 1e-5 changed x
-#: by 1e-4 mm. ECOS wants a relative tolerance above zero.
+#: by 1e-4 mm, and it gives up where its null space exceeds 4000. ECOS wants a relative tolerance above zero.
 TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "cvxopt": lambda tol, gap: {"feastol": tol, "abstol": gap, "reltol": 0.0, "maxiters": 1_000},
     "daqp": lambda tol, gap: {"primal_tol": tol, "dual_tol": min(tol, 1e-12), "iter_limit": 1_000_000},
@@ -32,6 +32,7 @@ TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
         "primal_feasibility_tolerance": max(tol, 1e-10),
         "dual_feasibility_tolerance": max(tol, 1e-10),
         "qp_regularization_value": 0.0,
+        "qp_nullspace_limit": 1_000_000,
     },
     "kvxopt": lambda tol, gap: {"feastol": tol, "abstol": gap, "reltol": 0.0, "maxiters": 1_000},
     "pyqpmad": lambda tol, gap: {"tolerance": tol, "max_iter": 1_000_000},
