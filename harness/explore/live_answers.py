@@ -70,7 +70,9 @@ class Settings:
         means = tuple(effect.mean for effect in scene.effects_of(InitialGap))
         pressures = tuple(effect.value for effect in scene.effects_of(Pressure))
         places = tuple((x, y) for x, y in marks.tolist())
-        return cls(places, fasteners[0].preload, means, pressures)
+        preload = fasteners[0].preload
+        assert isinstance(preload, float)  # as is refused otherwise
+        return cls(places, preload, means, pressures)
 
     def applied(self, scene: JointScene) -> tuple[Effect, ...]:
         """The scene's effects with these values. Raises InputError, as `validate` does."""

@@ -99,7 +99,8 @@ def movable_fasteners(scene: Scene) -> list[Fasteners]:
         raise InputError.one(where, "effect", "no fasteners", allowed)
     for name in ("preload", "between"):
         values = [getattr(effect, name) for effect in fasteners]
-        if any(value != values[0] for value in values):
+        each = name == "preload" and any(isinstance(value, tuple) for value in values)
+        if each or any(value != values[0] for value in values):
             raise InputError.one(where, f"fasteners.{name}", values, "the same in all: they change places")
     if scene.stages and (len(fasteners) > 1 or any(fasteners[0]._stages)):
         names = [effect.name for effect in fasteners]

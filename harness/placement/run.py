@@ -166,7 +166,7 @@ def place(
     goal = Goal(allow_gap_mm, share, count)
     order = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
     law = other_gaps(study.bare, study.cases)
-    text_of = partial(_scene_text, source, directory, law)
+    text_of = partial(_scene_text, source, directory, law, movable.fastener.preload)
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
@@ -211,11 +211,11 @@ def place(
         return Placement(plans.get("plan"), added, passed, words, write(directory))
 
 
-def _scene_text(source: str, directory: Path, law: RandomGaps | None, plan: Plan) -> str:
+def _scene_text(source: str, directory: Path, law: RandomGaps | None, preload: Any, plan: Plan) -> str:
     """The scene's file with the fasteners of a plan, and with the random gaps of `law` if there are any."""
 
     def change(document: Any) -> None:
-        with_fasteners(plan)(document)
+        with_fasteners(plan, preload)(document)
         if law is not None:
             with_gaps(law)(document)
 

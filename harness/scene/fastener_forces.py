@@ -5,8 +5,10 @@ parts together with preload + k (a − tᵀx), N, and pushes them apart where th
 """
 
 from collections.abc import Iterator
-from itertools import product, repeat
+from itertools import product
 from typing import Any, cast
+
+import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.model.effect import SpringEffect
@@ -23,7 +25,8 @@ def fastener_forces(scene: Scene, x: Vector) -> Iterator[dict[str, Any]]:
         if isinstance(effect, SpringEffect):
             pairs, forces = effect.tied(joint), effect.tension(joint, x).tolist()
         elif preloads := [getattr(effect, name) for name in FORCES if hasattr(effect, name)]:
-            pairs, forces = fastener.pairs(joint), repeat(*preloads)
+            pairs = fastener.pairs(joint)
+            forces = np.resize(preloads, len(pairs) * effect.element_count(joint)).tolist()
         else:
             continue
         places = product(pairs, effect.marks(joint).tolist())

@@ -45,17 +45,21 @@ def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequ
     return tomlkit.dumps(document)
 
 
-def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], None]:
+def with_fasteners(
+    points: Sequence[tuple[float, float]], preload: float | None = None
+) -> Callable[[Any], None]:
     """The change that moves all fasteners of a scene to these places, mm; none leaves it and its stages
-    without.
+    without. preload : N, where it was a column of their file.
     """
 
     def change(document: Any) -> None:
         tables = of_kind(document, "fasteners")
         if not tables:
             raise InputError.one("scene", 'effect kind = "fasteners"', "none", "at least one")
-        for key in ("pattern", "file", "columns", "points"):
+        for key in ("pattern", "file", "columns", "skip_lines", "points"):
             tables[0].pop(key, None)
+        if preload is not None:
+            tables[0].setdefault("preload", preload)
         if points:
             tables[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
         for other in tables[1 if points else 0 :]:

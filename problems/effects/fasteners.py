@@ -1,23 +1,33 @@
 """Fasteners: each presses the two parts of a contact together at a point."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Discriminator, Tag
 
 from problems.forms.assembly import Vector
-from problems.input.bounded_types import Positive
+from problems.input.bounded_types import NUMBER, NUMBERS, Positive, is_list
 from problems.model.interface import AnyJoint
 from problems.model.junction_terms import pressing_forces
 from problems.model.positions import Positions
 
 
 class Fasteners(Positions):
-    """f += preload on the first part of every contact, f −= preload on the second, in N.
+    """f += preload on the first part of every contact, f −= preload on the second, in N, of all or of each.
 
     A temporary fastener, or a rivet while it is being set: a force, no stiffness. It acts where it is: on the
     nodes around it, by the weights of its place.
     """
 
-    preload: Annotated[Positive, "N"]
+    more_columns: ClassVar[tuple[str, ...]] = ("preload",)
+    preload: Annotated[
+        Annotated[Positive, Tag(NUMBER)] | Annotated[tuple[Positive, ...], Tag(NUMBERS)],
+        Discriminator(is_list),
+        "N",
+    ]
 
     def force(self, joint: AnyJoint) -> Vector:
-        places = [(self.marks(joint), self.preload)]
+        marks = self.marks(joint)
+        preloads = np.resize(self.preload, len(marks))
+        places = [(marks[preloads == force], float(force)) for force in np.unique(preloads)]
         return pressing_forces(lambda pair: places, self.pairs(joint), joint)

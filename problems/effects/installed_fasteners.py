@@ -1,7 +1,7 @@
 """Installed fasteners: springs that tie the two parts of a contact together."""
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,6 +26,7 @@ class InstalledFasteners(Positions, SpringEffect):
     of its place on the nodes of each part around it, along the normal of the first.
     """
 
+    more_columns: ClassVar[tuple[str, ...]] = ("preload",)
     stiffness: Annotated[Positive, "N/mm"] = 1e5
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:

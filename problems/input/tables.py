@@ -35,7 +35,8 @@ LENGTHS = NO_UNIT | {"mm": Fraction(1), "m": Fraction(1000), "ft": Fraction("304
 LENGTHS |= dict.fromkeys(("um", "\u03bcm"), Fraction("0.001"))
 LENGTHS |= dict.fromkeys(("in", "inch", '"'), Fraction("25.4"))
 #: The units of columns that are no lengths, by name.
-UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT)
+FORCES = NO_UNIT | {"n": Fraction(1), "kn": Fraction(1000)}
+UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT) | {"preload": FORCES}
 WORDS = ("name", "stage", "side")  # headings of columns of words
 BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))
 HEADING = re.compile(rf"(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
@@ -265,7 +266,7 @@ def heading(cell: str) -> tuple[str, str]:
     if not (parts := HEADING.fullmatch(text)) or not parts[1]:
         return text, ""
     unit = parts[2] or parts[3] or ""
-    return (parts[1] if unit in LENGTHS else text), unit
+    return (parts[1] if unit in LENGTHS or (parts[1] == "preload" and unit in FORCES) else text), unit
 
 
 def _plain(cell: str) -> str:

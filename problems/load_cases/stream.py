@@ -45,9 +45,9 @@ class Stream(LoadCases):
     def of(cls, scene: JointScene, gaps: RandomGaps, form: Form) -> "Stream":
         """Raises InputError if the scene has no fasteners."""
         single = tuple(
-            effect.model_copy(update={"points": (place,), "pattern": None})
+            effect.only([k], scene.joint)
             for effect in scene.effects_of(Fasteners)
-            for place in map(tuple, effect.marks(scene.joint).tolist())
+            for k in range(effect.element_count(scene.joint))
         )
         if not single:
             allowed = 'an [[effect]] kind = "fasteners" that comes and goes'

@@ -38,6 +38,8 @@ class Effect(Table):
 
     #: Columns of the CSV that a table may name as `file` in place of `points`; empty if it may not.
     columns: ClassVar[tuple[str, ...]] = ()
+    #: Columns that it may have besides, each a parameter with a number for each point.
+    more_columns: ClassVar[tuple[str, ...]] = ()
     kind: str
     #: By which the stages of a scene call it.
     name: Name | None = None
@@ -241,8 +243,8 @@ class SpringEffect(ForceEffect):
     ----------
     approach : float or tuple of float
         The elongation at which a spring has its preload, mm: of all springs, or of each column of T.
-    preload : float
-        N.
+    preload : float or tuple of float
+        N, of all springs or of those at each point.
     """
 
     approach: Annotated[
@@ -250,7 +252,12 @@ class SpringEffect(ForceEffect):
         Discriminator(is_list),
         "mm",
     ] = 0.0
-    preload: Annotated[NotNegative, Field(exclude_if=lambda force: force == 0), "N"] = 0.0
+    preload: Annotated[
+        Annotated[NotNegative, Tag(NUMBER)] | Annotated[tuple[NotNegative, ...], Tag(NUMBERS)],
+        Discriminator(is_list),
+        Field(exclude_if=lambda force: force == 0),
+        "N",
+    ] = 0.0
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
@@ -260,12 +267,12 @@ class SpringEffect(ForceEffect):
 
     def force(self, joint: AnyJoint) -> Vector:
         T, k = self.springs(joint)
-        return T @ (k * self.approach + self.preload)
+        return T @ (k * self.approach + np.resize(self.preload, len(k)))
 
     def tension(self, joint: AnyJoint, x: Vector) -> Vector:
         """(r,) the force of each spring at displacements x (n,) mm; N."""
         T, k = self.springs(joint)
-        return k * (self.approach - T.T @ x) + self.preload
+        return k * (self.approach - T.T @ x) + np.resize(self.preload, len(k))
 
     @abstractmethod
     def tied(self, joint: AnyJoint) -> list[Pair]:

@@ -61,11 +61,19 @@ class EffectTable:
                 yield from wrong
                 return
             names, skip, missing = (content.get(key, value) for key, value in FILE_KEYS.items())
-            headings = tuple(names.get(name, name) for name in effect.columns)
-            options = TableOptions(headings, tuple(missing), skip)
-            self.rows = read_columns(self.where.parent / str(content["file"]), effect.columns, options)
+            wanted = (*effect.columns, *(name for name in effect.more_columns if name in names))
+            options = TableOptions(tuple(names.get(name, name) for name in wanted), tuple(missing), skip)
+            optional = [name for name in effect.more_columns if name not in names]
+            self.rows = read_columns(self.where.parent / str(content["file"]), wanted, options, optional)
             content = {key: value for key, value in content.items() if key not in (*FILE_KEYS, "file")}
-            content["points"] = self.rows.rows
+            count = len(effect.columns)
+            content["points"] = [row[:count] for row in self.rows.rows]
+            for k, name in enumerate(self.rows.columns[count:], start=count):
+                if name in content:
+                    allowed = f"left out: {self.rows.path.name} has a column {name}"
+                    yield from self._located(iter([(name, content[name], allowed)]))
+                column = [row[k] for row in self.rows.rows]
+                content[name] = column[0] if len(set(column)) == 1 else column
         try:
             self.effect = effect.model_validate(content)
             if self.rows:
@@ -83,9 +91,9 @@ class EffectTable:
         if "points" in self.content:
             yield "file", self.content["file"], "give either points or file"
         are_headings = isinstance(names, dict) and all(isinstance(value, str) for value in names.values())
-        if not (are_headings and set(names) <= set(effect.columns)):
+        if not (are_headings and set(names) <= {*effect.columns, *effect.more_columns}):
             allowed = f"headings of the file by name, as {{ {effect.columns[0]} = 'X [mm]' }}; names: "
-            yield "columns", names, allowed + ", ".join(effect.columns)
+            yield "columns", names, allowed + ", ".join((*effect.columns, *effect.more_columns))
         if type(skip) is not int or skip < 0:
             yield "skip_lines", skip, "a number of lines, 0 or more"
         if not isinstance(missing, list) or (missing and "gap" not in effect.columns):
@@ -114,7 +122,7 @@ class EffectTable:
     def _located(self, faults: Faults) -> Iterator[Fault]:
         """Yield faults of keys with the place of each: the scene, or the line of a file's row."""
         for key, value, allowed in faults:
-            row = re.fullmatch(r"points(?:\[(\d+)\]|\.(\d+)\.\d+)", key)
+            row = re.fullmatch(r"(?:points|preload)(?:\[(\d+)\]|\.(\d+)(?:\.\d+)?)", key)
             if self.rows and row:
                 line = self.rows.lines[int(row[1] or row[2])]
                 yield Fault(str(self.rows.path), f"line {line}", value, allowed)

@@ -79,15 +79,15 @@ class Positions(ContactEffect, ForceEffect):
 
     def only(self, elements: Sequence[int], joint: AnyJoint) -> Self:
         marks = self.marks(joint)
-        points = tuple(map(tuple, marks[elements].tolist()))
-        return (
-            self if len(points) == len(marks) else self.model_copy(update={"points": points, "pattern": None})
-        )
+        update: dict[str, object] = {"points": tuple(map(tuple, marks[elements].tolist())), "pattern": None}
+        if isinstance(preload := getattr(self, "preload", None), tuple):
+            update["preload"] = tuple(preload[k] for k in elements)
+        return self if len(elements) == len(marks) else self.model_copy(update=update)
 
     def unusual(self, joint: AnyJoint) -> Faults:
         thinnest = joint.thinnest
         for key in FORCES:
-            force, most = getattr(self, key, 0.0), TEARS * thinnest**2
+            force, most = np.max(getattr(self, key, 0.0)), TEARS * thinnest**2
             if force > most:
                 yield key, force, f"at most {most:g} N on {thinnest:g} mm: it would tear the part"
 
@@ -100,6 +100,9 @@ class Positions(ContactEffect, ForceEffect):
                 yield "pattern.edge", pattern.edge, f"at most half the junction, {min(spread) / 2:g} mm"
                 return
         marks = self.marks(joint)
+        if isinstance(preload := getattr(self, "preload", None), tuple) and len(preload) != len(marks):
+            yield "preload", list(preload), f"one number, or one for each of {len(marks)} points"
+            return
         for k in np.flatnonzero(~joint.covers(self.parts(joint), marks)):
             yield f"points[{k}]" if self.points else "pattern", marks[k].tolist(), on_junction(joint)
         for first, twin in crowded(marks) if self.in_holes and self.points else ():
