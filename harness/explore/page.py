@@ -33,14 +33,15 @@ from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
 from problems.scene_files import scene_of
-from report.document.numbers import position
+from report.document.numbers import counted, position
+from report.document.verdict_colours import FAIL, PASS
 
+VIEWPORT = '<meta name="viewport" content="width=device-width">'
 NOTHING = "rgba(0, 0, 0, 0)"
 DIGITS = 3  # of mm, where a fastener is dropped
 EXACT = ".12g"  # of a slider: without the rounding of its steps
-OVER = "#D55E00"  # gaps above the limit
 STALE = 0.35  # opacity of an answer to other settings
-WIDE = 760  # pixels of a map
+WIDE, NARROWEST = 760, 320  # pixels of a map; beside the dials where there is room
 TALLEST, LOWEST = 420, 150
 PROOF_MS = 50  # after the first change that is not proven: the map comes before
 
@@ -58,13 +59,13 @@ class Page:
         self.places: Matrix = assembly.contact_nodes
         self.raster = Raster.of(self.places)
         self.colours = LinearColorMapper(
-            palette="Viridis256", low=0.0, high=limit_mm, high_color=OVER, nan_color=NOTHING
+            palette="Viridis256", low=0.0, high=limit_mm, high_color=FAIL, nan_color=NOTHING
         )
         self.cells = ColumnDataSource({"gap": [self.raster.image(first.gap)]})
         self.kept_cells = ColumnDataSource(dict(self.cells.data))
         self.fasteners = ColumnDataSource(_columns(first.settings))
         self.kept_fasteners = ColumnDataSource(_columns(first.settings))
-        self.outcome, self.kept_outcome, self.fault = Div(width=WIDE), Div(width=WIDE), Div(width=WIDE)
+        self.outcome, self.kept_outcome, self.fault = (Div(sizing_mode="stretch_width") for _ in range(3))
         names = [one.stage for one in first.stages]
         self.stage = Select(title="after stage", value=first.stage, options=names, visible=bool(names))
         self.stage.on_change("value", lambda attr, old, new: self.show())
@@ -74,6 +75,7 @@ class Page:
         for slider in self.sliders.values():
             slider.on_change("value_throttled", self.changed)
         document.title = f"{explorer.scene.title}: where do the fasteners go?"
+        document.template = f"{{% block preamble %}}{VIEWPORT}{{% endblock %}}"
         document.add_root(self._layout())
         self.show()
         self.keep()
@@ -95,8 +97,9 @@ class Page:
         now = self._map("now", self.cells, self.fasteners, draws=True)
         then = self._map("kept", self.kept_cells, self.kept_fasteners, draws=False)
         dials = column(self.stage, *self.sliders.values(), self.path, row(keep, save), hint)
-        maps = column(self.outcome, now, self.fault, self.kept_outcome, then)
-        return row(maps, dials)
+        wide = {"flex": f"1 1 {NARROWEST}px", "max-width": f"{WIDE}px"}
+        maps = column(self.outcome, now, self.fault, self.kept_outcome, then, styles=wide)
+        return row(maps, dials, styles={"flex-wrap": "wrap"}, sizing_mode="stretch_width")
 
     def _map(self, title: str, cells: ColumnDataSource, fasteners: ColumnDataSource, draws: bool) -> Any:
         low, high = self.raster.low, self.raster.high
@@ -104,7 +107,8 @@ class Page:
         height = int(np.clip(WIDE * ratio + 60, LOWEST, TALLEST))
         plot = figure(
             title=title,
-            width=WIDE,
+            max_width=WIDE,
+            sizing_mode="stretch_width",
             height=height,
             x_range=(low[0], high[0]),
             y_range=(low[1], high[1]),
@@ -120,6 +124,7 @@ class Page:
             self.gaps = made
         plot.add_layout(ColorBar(color_mapper=self.colours, title="gap, mm"), "right")
         marks = plot.scatter("x", "y", source=fasteners, size=11, fill_color="white", line_color="black")
+        marks.nonselection_glyph = None  # the others stay as they are
         if draws:
             tool = PointDrawTool(renderers=[marks], empty_value=0.0)
             plot.add_tools(tool)
@@ -217,13 +222,13 @@ def outcome(answer: LiveAnswer, places: Matrix, limit_mm: float) -> str:
     sure = "…" if e is None else f"every gap within {e:.1e} mm, proven" if np.isfinite(e) else "not proven"
     untold = e is not None and not abs(gap - limit_mm) > e
     word = "cannot be told" if untold else "PASS" if gap <= limit_mm else "FAIL"
-    colour = {"PASS": "#009E73", "FAIL": OVER}.get(word, "#666666")
+    colour = {"PASS": PASS, "FAIL": FAIL}.get(word, "#666666")
     above = np.count_nonzero(answer.gap > limit_mm)
     after = f"after {escape(answer.stage)}: " if answer.stage else ""
     return (
         f'<b style="color:{colour};font-size:130%">{word}</b> {after}largest gap <b id="gap">{gap:.6g}</b> '
         f"mm at {place}; {above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
-        f"{len(answer.settings.places)} fasteners, {np.count_nonzero(answer.lam)} contacts closed, which "
+        f"{counted(len(answer.settings.places), 'fastener')}, {np.count_nonzero(answer.lam)} closed contacts "
         f"carry {answer.lam.sum():.4g} N. {sure}"
     )
 

@@ -105,8 +105,9 @@ def two_answers_data(answers: list[Answer]) -> Data:
     """The data of the page of two answers on one junction."""
     records = [record for record, _ in answers]
     named = [f"{record['scene']}: {record['title']}, {record['method']}" for record in records]
+    said = [headline(*answer)["text"] for answer in answers]
     maps = two_answers_maps(records[0], [arrays for _, arrays in answers])
-    both = [["first", named[0]], ["second", named[1]]]
+    both = [["first", named[0], said[0]], ["second", named[1], said[1]]]
     return _with_maps(records, both, maps)
 
 

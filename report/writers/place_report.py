@@ -11,13 +11,14 @@ from matplotlib.ticker import MaxNLocator
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import coordinate, counted, significant, whole
+from report.document.numbers import coordinate, counted, out_of, significant, whole
 from report.figures import style
 from report.figures.junction_maps import Map, drawn, larger_than, rooted
 from report.results.series_results import read as read_series
 from report.writers.sections_writer import emptied, written
 from report.writers.sheet import MESH, Sheet, exactness, origin, write_sheet
 
+FEW = 10  # failing cases that are named
 #: How a plan came about: its name in the table and the picture, and its look.
 FAMILIES = {
     "all candidates": ("all candidates", style.BLACK, "o", ""),
@@ -52,13 +53,10 @@ def _sheet(record: dict[str, Any], title: str, directory: Path) -> Sheet:
     facts = _summary(record).data.set_index("what")["value"]
     samples = [f"{name}: {text}." for name, text in facts.items() if ", round" in str(name)]
     sure = [exactness(float(solved.cases["gap_error_mm"].max())), *samples, MESH]
-    places = pd.DataFrame(best["plan"] if best else [], columns=["x", "y"])
-    places.insert(0, "number", range(1, len(places) + 1))
-    columns = [number("no.", "number", whole), *(number(f"{axis}, mm", axis, coordinate) for axis in "xy")]
-    plan = Table("plan", "*The plan.*", places, columns)
     picture = directory / "report" / "before-and-after.png"
     about = origin(record), record.get("inputs", {}), [picture] if picture.exists() else []
-    return Sheet(title, kind, said, sure, *about, [plan])
+    tables = [block for block in _order(record) if isinstance(block, Table)] if record["order"] else []
+    return Sheet(title, kind, said, sure, *about, tables)
 
 
 def _summary(record: dict[str, Any]) -> Table:
@@ -75,7 +73,12 @@ def _summary(record: dict[str, Any]) -> Table:
         failing, (low, high) = sample["failing"], (f"{100 * value:.4g}" for value in sample["interval"])
         said = f"{counted(sample['fasteners'], 'fastener')}: kept by {sample['kept']}, with "
         said += f"{100 * record['confidence']:g} % confidence {low} to {high} % of all"
-        which = f"; beyond the limit in cases {', '.join(map(str, failing))}" if failing else ""
+        some = ", ".join(map(str, failing[:FEW])) + (", …" if len(failing) > FEW else "")
+        which = (
+            f"; beyond the limit in {out_of(len(failing), sample['cases'], 'case')}: {some}"
+            if failing
+            else ""
+        )
         facts[f"{counted(sample['cases'], 'fresh case')}, round {n}"] = said + which
     if best is not None:
         facts["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"

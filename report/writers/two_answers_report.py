@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.numbers import coordinate, counted, position, significant, whole
 from report.figures.answer_maps import gap_maps
-from report.page.answer_page_data import two_answers_data
+from report.page.answer_page_data import headline, two_answers_data
 from report.page.page_file import write as write_page
 from report.results.answer_record import VERDICTS, Answer, contacts, fasteners, pair_name, read
 from report.writers.sections_writer import written
@@ -42,11 +42,11 @@ def write(
     said = [] if weights is None else [*_said_of_meshes(answers, table)]
     both = "the first scene, then the second"
     titles = [
-        f"[{record['title']}]({folder}/answer.md)"
-        for (record, _), folder in zip(answers, folders, strict=True)
+        f"[{name}: {record['title']}]({folder}/answer.md). {headline(record, arrays)['text']}"
+        for name, (record, arrays), folder in zip(names, answers, folders, strict=True)
     ]
     blocks: list[Block] = [
-        Text(f"First: {titles[0]}. Second: {titles[1]}. Every contact: [contacts.csv](contacts.csv)."),
+        Text(f"First: {titles[0]}\n\nSecond: {titles[1]}\n\nEvery contact: [contacts.csv](contacts.csv)."),
         *([Text(" ".join(said))] if said else []),
         Table("pairs", f"*Gaps, mm, and contact forces, N: {both}.*", pairs, _columns()),
     ]
