@@ -30,6 +30,9 @@ Verdict = Literal["within", "outside", "cannot_be_judged", "no_answer"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 ANSWERED = VERDICTS[:-1]
 
+#: The words for whether an answer exceeds a limit of its user; None: its error is too large to tell.
+EXCEEDED: dict[bool | None, str] = {True: "FAIL", False: "PASS", None: "cannot be told"}
+
 #: The forms of the quadratic program, in the order of every table.
 FORMS = ("sparse", "dual", "primal")
 #: Those of the matrices condensed onto the junction.

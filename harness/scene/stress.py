@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from harness.results.schema import EXCEEDED
 from harness.verification.enclosure import SAFE, length
 from harness.verification.proof import Proof
 from harness.verification.reference import proof_of
@@ -109,11 +110,10 @@ def stress_record(found: Stresses, mesh: MeshError | None, allowed: float | None
     if allowed is None:
         return record | {"said": said[0].upper() + said[1:]}
     exceeded = found.exceeded(allowed)
-    verdict = {None: "CANNOT BE TOLD", True: "FAIL", False: "PASS"}[exceeded]
     if grid is not None and abs(largest["von_mises"] - allowed) <= grid:
         said += ", closer to the limit than the mesh can tell"
     kind = {None: "", True: "fail", False: "pass"}[exceeded]
-    said = f"{verdict}: limit {allowed:g} N/mm²; {said}"
+    said = f"{EXCEEDED[exceeded].upper()}: limit {allowed:g} N/mm²; {said}"
     return record | {"allowed": allowed, "exceeded": exceeded, "kind": kind, "said": said}
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.results.schema import EXCEEDED
 from report.document.escape import quoted
 from report.document.numbers import position
 
@@ -81,7 +82,6 @@ def fasteners(record: dict[str, Any]) -> pd.DataFrame:
 
 
 ROUNDING = 1e-9  # of the largest force: a smaller one is rounding
-VERDICTS = {True: "FAIL", False: "PASS", None: "cannot be told"}
 
 
 def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
@@ -103,7 +103,7 @@ def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
         forces = {name: force if abs(force) > least else 0.0 for name, force in forces.items()}
         if "largest_stress" in stage:
             line["stress, N/mm²"] = stage["largest_stress"]
-        verdict = {"verdict": VERDICTS[stage["exceeded"]]} if "exceeded" in stage else {}
+        verdict = {"verdict": EXCEEDED[stage["exceeded"]]} if "exceeded" in stage else {}
         lines.append(line | {"closed": stage["closed"]} | forces | verdict)
     table = pd.DataFrame(lines)
     last = [name for name in ("contacts, N", "verdict") if name in table]

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 import scipy.sparse as sp
 
+from harness.results.schema import EXCEEDED
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.numbers import coordinate, counted, position, significant, whole
 from report.figures.answer_maps import gap_maps
 from report.page.answer_page_data import headline, two_answers_data
 from report.page.page_file import write as write_page
-from report.results.answer_record import VERDICTS, Answer, contacts, fasteners, pair_name, read
+from report.results.answer_record import Answer, contacts, fasteners, pair_name, read
 from report.writers.sections_writer import written
 
 SIDES = ("first", "second")
@@ -88,7 +89,7 @@ def _said_of_meshes(answers: list[Answer], table: pd.DataFrame) -> Iterator[str]
         yield f"Not compared: {beyond} of {counted(coarse, 'contact')}, beyond those of the other mesh."
     if "allowed_gap" in answers[0][0]:
         checks = [record["allowed_gap"] for record, _ in answers]
-        one, other = (VERDICTS[check["exceeded"]] for check in checks)
+        one, other = (EXCEEDED[check["exceeded"]] for check in checks)
         verdict = f"both are {one}" if one == other else f"the mesh decides: first {one}, second {other}"
         yield f"With a limit of {checks[0]['allowed_mm']:g} mm, {verdict}."
 
