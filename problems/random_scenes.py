@@ -27,7 +27,6 @@ EXAMPLES = [f"drawn/{kind}/0" for kind in KINDS]
 NUMBER, OF_VERSION = r"(0|[1-9][0-9]{0,4})", r"((?:@[0-9]+(?:\.[0-9]+)+)?)"
 FIRST = rf"(drawn/({'|'.join(KINDS)})/){NUMBER}"
 NAME, RANGE = re.compile(FIRST + OF_VERSION), re.compile(rf"{FIRST}\.\.([0-9]{{1,5}}){OF_VERSION}")
-SUPERELEMENT_NAME = re.compile(f"drawn/{SUPERELEMENTS}/{NUMBER}{OF_VERSION}")
 
 
 def drawn_names(pattern: str) -> list[str]:

@@ -30,7 +30,7 @@ from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import GAPS_ALONE, JointScene, MatricesScene, Output, Scene
 from problems.model.stages import Plan, Stage
-from problems.random_scenes import EXAMPLES, SUPERELEMENT_NAME, draw_of, drawn_table
+from problems.random_scenes import EXAMPLES, NAME, SUPERELEMENTS, draw_of, drawn_table
 
 from .errors import BACKSLASH, Fault, InputError
 
@@ -57,7 +57,7 @@ def read_scene(name_or_path: str) -> Scene:
         if name_or_path in (names := rung_names(prefix)):
             return make_rung(name_or_path)
         raise _unknown_scene(name_or_path, names)
-    if SUPERELEMENT_NAME.fullmatch(name_or_path):
+    if (drawn := NAME.fullmatch(name_or_path)) and drawn[2] == SUPERELEMENTS:
         from problems.random_superelements import drawn_joint
 
         return drawn_joint(name_or_path, draw_of(name_or_path))
