@@ -132,9 +132,13 @@ class Plan:
                 if name is not None and name in names[:number]:
                     allowed = f"a name of its own: {where}[{names.index(name)}] has it"
                     yield f"{where}[{number}].name", name, allowed
+        kinds = {effect.kind for effect in self.effects if effect.name is None}
         for number, effect in enumerate(self.effects):
             if effect.name == "contacts":
                 yield f"effect[{number}].name", effect.name, "another name: the forces of contacts have it"
+            elif effect.name in kinds:
+                allowed = "another name: that of a kind calls its effects that have no name"
+                yield f"effect[{number}].name", effect.name, allowed
         yield from self.wrong
         for number, effect in enumerate(self.effects):
             where = f"effect[{number}] ({effect.kind})"

@@ -280,6 +280,7 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ),
     ([CLAMP], {"name": "clamps"}, "effect[2].name = 'clamps'", "effect[1] has it"),
     ([CLAMP], {"name": "contacts"}, "effect[2].name = 'contacts'", "the forces of contacts"),
+    ([CLAMP], {"name": "initial_gap"}, "effect[2].name = 'initial_gap'", "calls its effects"),
     (
         [{"name": "1", "on": ["rivets"]}],
         {"points": PIN},
