@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from report.document.numbers import coordinate, listed, out_of, position, significant
+from report.document.numbers import coordinate, listed, out_of, position, significant, without_rounding
 from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
 from report.page.page_figures import map_item
 from report.page.page_file import Data, banner
@@ -83,7 +83,8 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
     at = f"contact {worst}"
     if "contact_nodes" in arrays:
         at = position(arrays["contact_nodes"][worst], arrays["contact_nodes"])
-    largest = f"the largest gap left is {significant(gap[worst])} mm, at {at} ({pair_name(pair)})"
+    left = without_rounding(gap[worst], abs(arrays["gap_before"]).max())
+    largest = f"the largest gap left is {significant(left)} mm, at {at} ({pair_name(pair)})"
     check = record.get("allowed_gap")
     if check is None:
         return {"kind": "", "text": f"{largest[0].upper()}{largest[1:]}."}

@@ -14,6 +14,7 @@ from report.document.blocks import Table, number, word
 from report.document.numbers import coordinate, extent, position, significant
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
+from report.page.answer_page_data import headline
 from report.writers import sheet
 from report.writers.sheet import LETTERS, exactness, origin, write_sheet
 
@@ -168,3 +169,11 @@ def test_places_are_rounded_by_the_size_of_the_part_and_a_gap_of_rounding_is_zer
     assert position(nodes[0] / 1e3, nodes / 1e3) == "(1.0779, 0) mm"
     assert extent(np.array([-1.1e-16, 0.73])) == "0 … 0.730"
     assert extent(np.array([-1.1e-6, 0.73])) == "-1.10e-6 … 0.730"
+
+
+def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:
+    record, arrays = answer(3)
+    for rounding in (-5.6e-17, 5.6e-17):
+        closed = arrays | {"gap_after": np.full(42, rounding)}
+        assert headline(record, closed)["text"].startswith("The largest gap left is 0 mm, at")
+    assert "is 2.00 mm" in headline(record, arrays)["text"]
