@@ -37,6 +37,8 @@ class GapCases:
     gaps : Path, optional
         Measured gaps in place of random ones: .csv, .npz or .npy, one row per case, one column per contact,
         mm.
+    options : TableOptions, optional
+        Headings of the scan's columns x, y and gap, and marks of missing gaps.
     random : tuple of str, optional
         KEY=DISTRIBUTION, keys of the scene that are random, as "fasteners.preload=each normal(1000, 100)".
     contributors : int, optional
@@ -45,8 +47,6 @@ class GapCases:
         Scans of many joints, as "scans/*.csv": the gaps vary about their mean by their principal modes.
     variance : float, optional
         The share of the variance of `scans` that the modes keep; by default 0.99.
-    options : TableOptions, optional
-        Headings of the scan's columns x, y and gap, and marks of missing gaps.
 
     Examples
     --------
