@@ -44,7 +44,8 @@ class GapCases:
     contributors : int, optional
         Number N of base points, a power of 2: the cases are the N (d + 2) that show what d inputs contribute.
     scans : str, optional
-        Scans of many joints, as "scans/*.csv": the gaps vary about their mean by their principal modes.
+        The files of scans of many joints, as ``scans/*.csv``: the gaps vary about their mean by their
+        principal modes.
     variance : float, optional
         The share of the variance of `scans` that the modes keep; by default 0.99.
 
