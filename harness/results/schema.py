@@ -151,6 +151,7 @@ class MeasurementRow(Report, Origin, total=False):
     series: dict[str, Any] | None
     time_limit_s: float
     memory_limit_mib: int
+    stop: str | None  # why time_limit_s is tighter than the suite's; in rows until version 0.3.0
     limit_mm: float  # for the displacement error, on a rung of a ladder computed; in the suite:
     limit_asked_mm: float
 

@@ -269,13 +269,13 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         " and not case.trial.lam[~case.C].any()": ("",),
     },
     "problems/model/effect.py": {
-        "T @ (k * self.approach + self.preload)": (
-            "T @ (k * self.approach)",
-            "T @ (self.approach + self.preload)",
+        "(k * self.approach + np.resize(self.preload, len(k)))": (
+            "(k * self.approach)",
+            "(self.approach + np.resize(self.preload, len(k)))",
         ),
-        "k * (self.approach - T.T @ x) + self.preload": (
+        "k * (self.approach - T.T @ x) + np.resize(self.preload, len(k))": (
             "k * (self.approach - T.T @ x)",
-            "k * (self.approach + T.T @ x) + self.preload",
+            "k * (self.approach + T.T @ x) + np.resize(self.preload, len(k))",
         ),
     },
     "problems/model/joint_model.py": {
