@@ -16,7 +16,7 @@ import pandas as pd
 
 from harness.measurement.scheduler import workers
 from harness.measurement.solver_descriptions import described
-from harness.placement.answer_journal import PLANS, AnswerJournal
+from harness.placement.answer_journal import PLANS, AnswerJournal, refuse_other_command
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
 from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
 from harness.placement.search import Search
@@ -38,7 +38,6 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
-from problems.input.tables import AS_NAMED
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
@@ -140,8 +139,7 @@ def place(
     refuse_inputs([directory / name for name in OUTPUTS], inputs)
     movable = MovableFasteners.of(read_scene(source))
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
-    random = [gap for gap in movable.bare.effects_of(InitialGap) if gap.random]
-    single = replace(cases, options=AS_NAMED) == DEFAULT and not random
+    single = cases.are_one(movable.bare)
     faults = cases.faults(table=None if candidates is None else str(candidates))
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
@@ -170,10 +168,7 @@ def place(
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
-    there = [name for name in (*OUTPUTS, *SERIES) if (directory / name).exists()]
-    if there and PLANS not in there:
-        allowed = f"has {there[0]} of another command: name another directory"
-        raise InputError.one("--out", "directory", str(directory), allowed)
+    refuse_other_command(directory, (*OUTPUTS, *SERIES), PLANS)
     if order.table:
         reporter.say(HELD_BACK)
     nodes = prepared(study.bare, form=form).assembly.contact_nodes

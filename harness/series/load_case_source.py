@@ -1,7 +1,7 @@
 """Where the load cases of `series` and `place` come from: random gaps, scans, or a table of measured gaps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from glob import glob
 from itertools import chain
 from pathlib import Path
@@ -95,6 +95,11 @@ class GapCases:
             allowed = "--scans, random gaps, --gaps or --sweep" if sweep else "--scans, random gaps or --gaps"
             faults.append(Fault("cases", "given", " ".join(chain(*sources)), allowed))
         return faults
+
+    def are_one(self, scene: JointScene) -> bool:
+        """Whether a search on this scene has one case, the scene itself: its gaps are not random."""
+        random = any(gap.random for gap in scene.effects_of(InitialGap))
+        return replace(self, options=AS_NAMED) == DEFAULT and not random
 
     def of(self, scene: Scene, form: Form) -> LoadCases:
         """The load cases of a scene. Raises InputError, as `measured_gaps` and `random_gaps` do."""

@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 
 from harness.measurement.scheduler import workers
-from harness.placement.answer_journal import AnswerJournal
+from harness.placement.answer_journal import AnswerJournal, refuse_other_command
 from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
 from harness.planning.form_choice import chosen_form
@@ -27,10 +27,8 @@ from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
 from problems.build import load_case
-from problems.effects.initial_gap import InitialGap
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
-from problems.input.tables import AS_NAMED
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.model.effect import SpringEffect
@@ -148,8 +146,7 @@ def shim(
         raise InputError(faults)
     if allow_stress is not None:
         refuse_unusable(allow_stress, bare)
-    random = [gap for gap in bare.effects_of(InitialGap) if gap.random]
-    single = replace(cases, options=AS_NAMED) == DEFAULT and not random
+    single = cases.are_one(bare)
     form = chosen_form(bare, ("dual", "sparse"), None, 1 if single else cases.count or RANDOM).form
     made = Listed((load_case(bare, form),)) if single else cases.of(bare, form)
     for sentence in (*bare.unusual, *made.notes):
@@ -181,10 +178,7 @@ def shim(
         "form": form,
         "rivetbench_version": installed_version("rivetbench"),
     }
-    old = [name for name in OUTPUTS if (directory / name).exists()]
-    if old and ANSWERS not in old:
-        allowed = f"has {old[0]} of another command: name another directory"
-        raise InputError.one("--out", "directory", str(directory), allowed)
+    refuse_other_command(directory, OUTPUTS, ANSWERS)
     if order.table:
         reporter.say(HELD_BACK)
     with records.locked(directory, (), other=records.MEASUREMENTS):
