@@ -19,6 +19,7 @@ The harness calls and times the steps; a solver never reads a clock, judges its 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, ClassVar, Literal
 
 from problems.forms import DENSE_FORMS as DENSE_FORMS
@@ -117,6 +118,9 @@ class Solver(ABC):
         The forms that the solver takes. In the sparse one, blocks and G are SciPy's sparse arrays.
     distribution : str, optional
         The distribution of the library, if it has another name than the solver.
+    time_limit_s : float
+        Seconds after which a library with a limit of its own is to stop and give its last iterate; set by
+        the harness.
 
     Notes
     -----
@@ -152,6 +156,7 @@ class Solver(ABC):
 
     forms: tuple[Form, ...] = DENSE_FORMS
     distribution: ClassVar[str | None] = None
+    time_limit_s: float = inf
 
     def convert(self, problem: Problem) -> Any:
         """Bring the data of an assembly into the library's own format; once per assembly.

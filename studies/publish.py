@@ -2,8 +2,9 @@
 
 Takes hours; Ctrl-C stops it, and the same command goes on. A suite is measured in results/publishing/COMMIT.
 It takes its place in results/published when it is whole: the run ended well, and every row is of this commit,
-without changes. What has such rows already is not measured again. At the end, and alone with --index, the
-index is written anew.
+without changes. What has such rows already is not measured again. A published row that was measured beside a
+round of ours (`beside` in suite.py) stays while its scene, its solver and that one's version and code are the
+same. At the end, and alone with --index, the index is written anew.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,7 @@ from harness.results.schema import OWNERS, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.terminal import INTERRUPTED
 from report.analysis.standings import of_fastest
+from report.document.numbers import listed
 from report.results.reader import read
 from report.sections.series_throughput import compared
 from report.sections.time_to_solution import against_ours, how_fast_table, ours_and_others
@@ -100,6 +103,8 @@ def measure(names: Sequence[str], digits: str) -> list[str]:
         last = minutes(rows_of(PUBLISHED / name))
         print(f"{k + 1} of {len(due)}: {name}" + (f", {last:.0f} minutes the last time" if last else ""))
         directory = STAGED / digits[:DIGITS] / name
+        if not directory.exists():
+            begin(name, directory)
         words = ["series", *SERIES[name]] if name in SERIES else ["run", name]
         code = ended([*words, "--out", str(directory)])
         if code == INTERRUPTED:
@@ -111,6 +116,21 @@ def measure(names: Sequence[str], digits: str) -> list[str]:
             write_study(directory)
         publish(name, directory)
     return failed
+
+
+def begin(name: str, directory: Path) -> None:
+    """Put the published rows in rounds into a directory, where `run` sets aside what has changed since."""
+    published = PUBLISHED / name
+    if kept := [dict(row) for row in rows_of(published) if in_rounds(row)]:
+        directory.mkdir(parents=True)
+        records.rewrite(directory / records.MEASUREMENTS, kept)
+        for path in [*published.glob("machine*.json"), *published.glob(records.OUTDATED)]:
+            shutil.copy(path, directory)
+
+
+def in_rounds(row: Mapping[str, Any]) -> bool:
+    """Whether it belongs to a round of ours, or was measured beside one."""
+    return bool(row.get("round") or row.get("beside_round"))
 
 
 def ended(command: Sequence[str]) -> int:
@@ -128,15 +148,19 @@ def rows_of(directory: Path) -> Rows:
 
 
 def is_of(rows: Rows, digits: str) -> bool:
-    """Whether there are rows, and all were measured with that commit, without changes."""
-    return bool(rows) and all((row.get("commit"), row.get("clean")) == (digits, True) for row in rows)
+    """Whether there are rows, all without changes of the code, and of that commit if not in rounds."""
+    of = {row.get("commit") for row in rows if not in_rounds(row)}
+    return of == {digits} and all(row.get("clean") is True for row in rows)
 
 
 def minutes(rows: Rows) -> float | None:
     """How long the measurement took, by the times of the rows; None if they have none."""
-    times = sorted(datetime.fromisoformat(str(row["recorded_at"])) for row in rows if row.get("recorded_at"))
-    steps = [(after - before).total_seconds() for before, after in pairwise(times)]
-    return sum(step for step in steps if step <= LONGEST_PAUSE_S) / 60 if steps else None
+    at = [(datetime.fromisoformat(str(row["recorded_at"])), row) for row in rows if row.get("recorded_at")]
+    steps = [
+        ((after - before).total_seconds(), row.get("solve_s") or row.get("time_limit_s") or 0.0)
+        for (before, _), (after, row) in pairwise(sorted(at, key=itemgetter(0)))
+    ]
+    return sum(s for s, longest in steps if s <= LONGEST_PAUSE_S + longest) / 60 if steps else None
 
 
 def publish(name: str, directory: Path) -> None:
@@ -202,12 +226,16 @@ def write_index(folder: Path) -> Path:
 def _how_fast(folder: Path) -> str:
     """The table that README and the documents quote: of `speed`, and of series with proofs."""
     tables = [ours_and_others(read(folder / "speed"))] if rows_of(folder / "speed") else []
+    measured = [*rows_of(folder / "speed"), *rows_of(folder / "series")]
+    machines = sorted({str(row["machine"]) for row in measured if row.get("machine")})
     if rows_of(folder / "series"):
         rows = read(folder / "series").rows
         proven = {SERIES[name][0]: _seconds(folder / name) for name in SERIES if rows_of(folder / name)}
         tables.append(in_series(rows[rows["threads"] == rows["threads"].max()], proven))
     table = pd.concat([pd.DataFrame(), *tables])
-    return "" if table.empty else f"\n## How fast is it?\n\n{how_fast_table(table).markdown}\n"
+    if table.empty:
+        return ""
+    return f"\n## How fast is it?\n\n{how_fast_table(table).markdown}\n\nMeasured on {listed(machines)}.\n"
 
 
 def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.DataFrame:

@@ -3,7 +3,8 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.planning.plan import Measurement, expand, of_key, with_key
+from harness.planning.plan import ROUND, Measurement, expand, of_key, round_beside, with_key
 from harness.planning.suite import Suite, to_toml
 from harness.planning.tolerance_search import still_needed
 from harness.results import records
@@ -46,6 +47,7 @@ def run(
     the suite cannot be run; after KeyboardInterrupt the same command resumes.
     """
     if key is not None:
+        key = key.partition(ROUND)[0]
         suite = with_key(suite, key)
     descriptions = describe(suite, ConsoleReporter(console))
     suite = with_forms(suite, descriptions)
@@ -88,6 +90,8 @@ def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
     return suite.model_copy(update={"solver": filled})
 
 
+#: For so long after the beginning of a round, what is measured on its scene is measured beside it.
+ROUND_LASTS = timedelta(hours=1)
 #: A task that is being done, and the problem that its answers are judged on.
 Pending = tuple[Task, ReferenceProblem]
 #: Does tasks, each beside what stays here; gives back the latter with the result, or with the exception.
@@ -139,11 +143,7 @@ class Measuring:
         """One task after another; a scene is opened before its first task of a family of forms."""
         opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
         made = set[str]()  # the forms whose matrices are made
-        for batch in batches(remaining):
-            m = still_needed(batch[0], self.rows)
-            if m is None:
-                self.display.passed_over(len(batch))
-                continue
+        for m, *others in self.due(remaining):
             if any(problem.scene.name != m.scene for problem in opened.values()):
                 opened, made = {}, set()
             family = form_family(m.form)
@@ -155,8 +155,28 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task([m, *batch[1:]], self.solvers[m.solver, m.variant])
+            task = Task([m, *others], self.solvers[m.solver, m.variant])
             yield (task, problem), task
+
+    def due(self, remaining: list[Measurement]) -> Iterator[list[Measurement]]:
+        """The batches that are still needed when their turn comes, and rounds before what is not ours."""
+        began = dict[str, datetime]()  # the last round on each scene
+        for batch in batches(remaining):
+            m = still_needed(batch[0], self.rows)
+            if m is None:
+                self.display.passed_over(len(batch))
+                continue
+            ours = m.entry.beside or self.solvers[m.solver, m.variant].owner == "ours"
+            if ours or not any(entry.beside for entry in m.suite.solver):
+                yield [m, *batch[1:]]
+                continue
+            now = datetime.now(UTC)
+            if m.scene not in began or now - began[m.scene] > ROUND_LASTS:
+                again = round_beside(m, now.isoformat(timespec="seconds"))
+                began[m.scene] = now
+                self.display.added(len(again))
+                yield from ([each] for each in again)
+            yield [replace(m, beside_round=began[m.scene].isoformat(timespec="seconds"))]
 
 
 def batches(remaining: list[Measurement]) -> list[list[Measurement]]:

@@ -38,6 +38,7 @@ from .monitored_call import Monitored
 START_S = 300.0  # for the imports and opening the data
 SAVE_S = 60.0  # for saving the answer
 PAGE = 4096
+OWN_LIMIT = 0.97  # of the time limit, for a library that stops by itself
 YARDSTICK_REPEATS = 3
 #: The fields that are reported once for all the load cases of a series.
 SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib")
@@ -77,6 +78,8 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
         last = finished[-1]
         last["peak_rss_mib"] = max(last.get("peak_rss_mib") or 0.0, process.peak_mib) or None
         last["stderr"] = process.stderr_text
+        if last["status"] == "time_limit" and "iterations" not in last:
+            last["message"] = f"{last['message']}; iterations and error are unknown"
     ended = measurements[len(finished) - 1].key
     lost: Outcome = {"status": last["status"], "message": f"not run: {ended} ended the process"}
     return finished + [lost] * (len(measurements) - len(finished))
@@ -139,13 +142,19 @@ class Run(Reporter):
         (load,) = problem.loads([case])
         form_s = time.perf_counter() - start
         near = session.nearest(load)
+        began = time.monotonic()
         self.begin(session)
         answer = session.next(load, near)
+        stopped = answer.status != "solved" and time.monotonic() - began >= session.solver.time_limit_s
         x = answer.x
         if "x" not in problem.needs and answer.lam is not None:
             with self.step("form_s", form_s):
                 (x,) = problem.recover([answer.lam], [None], [case])
-        return self.saved(answer, x, answer_file, problem, figures(answer) | {"warm": near is not None})
+        outcome = self.saved(answer, x, answer_file, problem, figures(answer) | {"warm": near is not None})
+        if stopped:
+            last = f"stopped by itself after {session.solver.time_limit_s:g} s, with its last iterate"
+            outcome |= {"status": "time_limit", "message": last}
+        return outcome
 
     def solved_batch(
         self, session: SolverSession, cases: Sequence[LoadCase], answer_files: Sequence[Path]
@@ -177,6 +186,7 @@ class Run(Reporter):
         self.events.report(phase="solve")
         if not session.opened:
             self.events.report(data_mib=resident_mib("VmRSS"))
+            session.solver.time_limit_s = OWN_LIMIT * self.first.time_limit_s
             session.open(batched=self.first.entry.batched is not None)
 
     def saved(

@@ -20,6 +20,8 @@ from .suite import RandomCases, SolverEntry, Suite
 #: The tolerances of "auto", the loosest first: decades, and one about half-way between each two.
 HALF_DECADES = [float(text) for k in range(3, 17) for text in (f"1e-{k}", f"3e-{k + 1}")][:-1]
 MOST_REPEATS = 5  # of "auto"
+ROUND_REPEATS = 3  # at most, of what is measured in a round
+ROUND = " round="  # before the time, in the keys of a round
 BEST = 1.0
 
 
@@ -30,7 +32,8 @@ class Measurement:
     entry : the settings, one of the suite's. scene : the name in the tables; source : a name or an absolute
     path for `read_scene`. case : the number of the load case in a series. guide : the scene whose rows decide
     whether a library's form is measured on this one, and how many times as long as its best it may take there
-    (tolerance_search.py); None if all forms are.
+    (tolerance_search.py); None if all forms are. round : when a round began, in which an entry with `beside`
+    is measured again; beside_round : the round beside which this one is measured.
     """
 
     suite: Suite
@@ -44,6 +47,8 @@ class Measurement:
     time_limit_s: float
     case: int | None = None
     guide: tuple[str, float] | None = None
+    round: str = ""
+    beside_round: str = ""
 
     @property
     def solver(self) -> str:
@@ -81,7 +86,8 @@ class Measurement:
         words += [] if self.entry.batched is None else [f"batched={self.entry.batched}"]
         words += [] if self.case is None else [f"case={self.case}"]
         options = self.entry.options
-        return " ".join(words + ([json.dumps(options, sort_keys=True)] if options else []))
+        words += [json.dumps(options, sort_keys=True)] if options else []
+        return " ".join(words) + (f"{ROUND}{self.round}" if self.round else "")
 
     def same_settings(self, row: Mapping[str, Any]) -> bool:
         """Whether a row is of this solver, form, options and threads, whatever its scene and tolerance."""
@@ -93,7 +99,12 @@ class Measurement:
     def stem(self) -> str:
         """The stem of its file names."""
         words = [self.scene, self.solver, self.form, self.variant, f"{self.tolerance:g}"]
-        words += [f"t{self.threads}", f"r{self.repeat}", "" if self.case is None else f"c{self.case}"]
+        words += [
+            f"t{self.threads}",
+            f"r{self.repeat}",
+            "" if self.case is None else f"c{self.case}",
+            self.round,
+        ]
         return re.sub(r"[^\w.+-]+", "-", "_".join(filter(None, words)))
 
 
@@ -167,6 +178,14 @@ def _of_entry(suite: Suite, entry: SolverEntry, scene: Scene, source: str) -> It
         yield Measurement(
             suite, entry, scene.name, source, form, tolerance, threads, repeat, time_limit_s, case
         )
+
+
+def round_beside(m: Measurement, time: str) -> list[Measurement]:
+    """The suite's entries with `beside` on m's scene, to be measured in a round that begins at a time."""
+    scene = read_scene(m.source)
+    entries = (e for e in m.suite.solver if e.beside and _applies(e, scene.name, m.source))
+    of_scene = (each for e in entries for each in _of_entry(m.suite, e, scene, m.source))
+    return [replace(each, round=time) for each in of_scene if each.repeat < ROUND_REPEATS]
 
 
 def _round_and_place(m: Measurement) -> tuple[int, float]:

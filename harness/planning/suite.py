@@ -72,7 +72,8 @@ class SolverEntry(BaseModel):
     override the suite's. "auto" as tolerances searches for the loosest that reaches the limit on each scene,
     as repeats it repeats what is quick (tolerance_search.py). batched : load cases of a series solved at
     once, by the solver's `batched`. with = ["piqp==0.6.2"] measures it in an environment that has this
-    version of its library, and what else is listed.
+    version of its library, and what else is listed. beside : it is measured again, at most an hour before
+    what is not ours, so that ratios are of one machine and hour.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, serialize_by_alias=True)
@@ -88,6 +89,7 @@ class SolverEntry(BaseModel):
     cases: Cases | None = None
     batched: PositiveInt | None = None
     gated: bool = True
+    beside: bool = False
     time_limit_s: Positive | None = None
     requirements: Annotated[list[Requirement] | None, NonEmpty, Field(alias="with")] = None
 
@@ -189,7 +191,7 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
     faults = list(faults)
     suite = valid_table(Suite, data, path, faults)
     if suite is not None:
-        faults += [*_indistinguishable(suite, path), *_of_series(suite, path)]
+        faults += [*_indistinguishable(suite, path), *_of_series(suite, path), *_of_rounds(suite, path)]
     if faults or suite is None:
         raise InputError(faults)
     return suite
@@ -249,6 +251,14 @@ def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
         if other := [key for key in setting if first[key] != setting[key]]:
             allowed = f"{entry.name} has other {other[0]} under this variant above; choose another variant"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
+
+
+def _of_rounds(suite: Suite, path: Path) -> Iterator[Fault]:
+    """Entries with `beside` that a round cannot measure."""
+    allowed = "needs numbers as tolerances, and a suite without [series]"
+    for k, entry in enumerate(suite.solver):
+        if entry.beside and (suite.series or (entry.tolerances or suite.tolerances) == "auto"):
+            yield Fault(str(path), f"solver.{k}.beside", True, allowed)
 
 
 def _of_series(suite: Suite, path: Path) -> Iterator[Fault]:

@@ -53,7 +53,7 @@ def read_side(name: str, key: str | None = None) -> Side:
     path = Path(name) / MEASUREMENTS
     if not path.is_file():
         raise InputError.one("DIR", "directory", name, f"has no {path.name}; `run` creates one")
-    rows = read(path)
+    rows = [row for row in read(path) if not row.get("round")]
     refuse_wrong_kinds(path, rows, needed=NEEDED)
     if not rows:
         raise InputError.one("DIR", "directory", name, f"{path.name} has no row yet")

@@ -144,6 +144,8 @@ class MeasurementRow(Report, Origin, total=False):
     tolerance: float
     searched: bool  # the tolerance is one of those tried for the loosest that suffices
     repeat: int
+    round: str | None  # when the round began in which it was measured again, beside others of its scene
+    beside_round: str | None  # the round beside which it was measured
     options: dict[str, Any]
     gated: bool
     threads_asked: int

@@ -225,6 +225,10 @@ class Display(Reporter):
         self.console.print(row_text(row), soft_wrap=True)
         self.passed_over(1)
 
+    def added(self, count: int) -> None:
+        """Note that so many more measurements are made."""
+        self.bar.update(self.task, total=(self.bar.tasks[self.task].total or 0) + count)
+
     def passed_over(self, count: int) -> None:
         """Note that so many measurements need not be made any more."""
         self.bar.update(self.task, advance=count)

@@ -175,10 +175,10 @@ def seconds_text(cell: Mapping[str, Any]) -> str:
     """The seconds per load case, or why there is no answer within the limit."""
     if cell["verdict"] == "within":
         return significant(cell["load_case_s"])
-    if cell["verdict"] in ANSWERED:
-        return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
     if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
         return f"> {cell['time_limit_s']:.4g}"
+    if cell["verdict"] in ANSWERED:
+        return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
     return str(cell["status"]).replace("_", " ") or MISSING
 
 

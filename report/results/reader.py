@@ -20,7 +20,7 @@ from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
 from report.results.rows import cells_of
 
-from .rows import frame
+from .rows import VERSION, frame
 
 MOST_SHOWN = 40  # scenes drawn at random: more have a section of their own alone
 FAR_AWAY = 1e15  # mm: no picture is so large
@@ -28,7 +28,11 @@ FAR_AWAY = 1e15  # mm: no picture is so large
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """One directory of results: `rows` and `cells` as above, the rest as read from its files."""
+    """One directory of results: `rows` and `cells` as above, the rest as read from its files.
+
+    rounds : the rows of ours measured again beside others (suite.py, `beside`), which are not in `rows`.
+    outdated : rows of other versions of a solver or of its adapter, set aside when it was measured anew.
+    """
 
     directory: Path
     rows: pd.DataFrame
@@ -38,6 +42,8 @@ class Results:
     machines: dict[str, dict[str, Any]] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     left_out: int = 0  # rows of equal measurements, and of tolerances tried in a search for one
+    rounds: pd.DataFrame = field(default_factory=lambda: frame([]))
+    outdated: pd.DataFrame = field(default_factory=lambda: frame([]))
 
     @property
     def title(self) -> str:
@@ -104,13 +110,16 @@ def read(directory: Path) -> Results:
         raise FileNotFoundError(f"{path}: no such file; a results directory holds measurements.jsonl")
     records, warnings = _json_lines(path)
     scenes, more = _json_lines(directory / "problems.jsonl")
+    old, _ = _json_lines(directory / "measurements.outdated.jsonl")
     problems = pd.DataFrame(scenes)
     suite = _loaded(directory / "suite.toml", tomllib.loads, more)
     facts = [_loaded(file, json.loads, more) for file in sorted(directory.glob("machine*.json"))]
     machines = {str(fact.get("machine", "")): fact for fact in facts}
     rows = frame(records)
-    left_out = len(records) - len(rows)
-    return Results(directory, rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out)
+    left_out, again = len(records) - len(rows), rows["round"] != ""
+    rows, rounds = (rows[of].reset_index(drop=True) for of in (~again, again))
+    read = rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out
+    return Results(directory, *read, rounds, frame(old, VERSION))
 
 
 def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dict[str, Any]:

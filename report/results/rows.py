@@ -16,14 +16,17 @@ from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
-CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
+CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads", "round"]
+VERSION = ["solver_version", "solver_code"]
 MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
 MEDIANS += ["solver_reported_s", "cholesky_s", "product_s"]
 LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 
-def frame(records: list[dict[str, Any]]) -> pd.DataFrame:
+def frame(records: list[dict[str, Any]], by: Sequence[str] = ()) -> pd.DataFrame:
     """The rows with every field of the schema as a column of one type, the last of equal measurements.
+
+    by : columns in which equal measurements do not differ, beside those of a cell.
 
     Flags are 1.0, 0.0 or missing. Adds `working_mib`, the memory that the solver needs on top of the data.
     """
@@ -36,13 +39,13 @@ def frame(records: list[dict[str, Any]]) -> pd.DataFrame:
         rows[name] = column.map(lambda value: "" if pd.isna(value) else str(value))
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
-    rows = rows.drop_duplicates([*CELL, "repeat", "case"], keep="last")
-    return rows[_chosen(rows)].reset_index(drop=True)
+    rows = rows.drop_duplicates([*CELL, "repeat", "case", *by], keep="last")
+    return rows[_chosen(rows, by)].reset_index(drop=True)
 
 
-def _chosen(rows: pd.DataFrame) -> pd.Series[bool]:
+def _chosen(rows: pd.DataFrame, by: Sequence[str]) -> pd.Series[bool]:
     """The rows to keep: a search keeps its loosest tolerance within the limit, or else the tightest."""
-    line = [name for name in CELL if name != "tolerance"]
+    line = [name for name in (*CELL, *by) if name != "tolerance"]
     searched, first = rows["searched"] == 1.0, rows["repeat"] == 0
     within = rows["tolerance"].where(first & (rows["verdict"] == "within"))
     best = rows.assign(tolerance=within).groupby(line, dropna=False)["tolerance"].transform("max")

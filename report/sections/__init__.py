@@ -14,6 +14,7 @@ from report.results.reader import Results
 from . import (
     accuracy,
     all_measurements,
+    history,
     ladders,
     outside,
     random_scenes,
@@ -37,6 +38,7 @@ SECTIONS: list[tuple[About, Callable[[Results], Section | None]]] = [
     ("scenes", summary.advice),
     ("scenes", summary.summary),
     ("all", versions.section),
+    ("all", history.section),
     ("scenes", time_to_solution.section),
     ("scenes", speed.contacts),
     ("scenes", speed.machine),

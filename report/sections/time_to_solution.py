@@ -1,6 +1,7 @@
 """How fast is it, from the scene on? Against libraries and textbook methods, and stage by stage."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -40,11 +41,12 @@ ROW, AROUND = 0.19, 0.45  # inches: a bar; the title and the axis of a panel
 def how_fast(results: Results) -> Section | None:
     """The seconds of ours, and libraries and textbook methods as multiples, over all solvers and forms."""
     table = ours_and_others(results)
-    return None if table.empty else Section("How fast is it?", [how_fast_table(table)])
+    machines = " and ".join(sorted({*results.rows["machine"], *results.rounds["machine"]}))
+    return None if table.empty else Section("How fast is it?", [how_fast_table(table, f" On {machines}.")])
 
 
-def how_fast_table(table: pd.DataFrame) -> Table:
-    """A table of lines as `ours_and_others` makes them."""
+def how_fast_table(table: pd.DataFrame, machines: str = "") -> Table:
+    """A table of lines as `ours_and_others` makes them. machines : a sentence on where they were measured."""
     columns = [
         word("question", "question"),
         number("n", "n", whole),
@@ -57,7 +59,7 @@ def how_fast_table(table: pd.DataFrame) -> Table:
         "*How fast is it?* From the scene on: condensation, factors, Q and preparation included where a form "
         "needs them. Seconds of the fastest of ours, the median over the scenes; the others as multiples of "
         "it, the median (the least). A scene on which none of them is within the limit counts as more than "
-        "all others."
+        f"all others.{machines}"
     )
     return Table("how-fast", caption, table, columns, keys=2)
 
@@ -84,15 +86,21 @@ def ours_and_others(results: Results) -> pd.DataFrame:
     library_none : the scenes on which no library is within the limit; they count as more than all others
     textbook, … : the same for the textbook methods
 
+    What was measured beside a round of ours (suite.py, `beside`) is compared with the fastest of that round.
     Empty unless libraries and textbook methods were measured on these scenes, in sparse and in dense forms.
     """
-    ways = roads(results)
+    ways = roads(replace(results, rows=pd.concat([results.rows, results.rounds], ignore_index=True)))
     if ways.empty or not set(OWNERS) <= set(ways["owner"]):
         return pd.DataFrame()
     ways = ways[ways["verdict"] == "within"]
-    lines = []
+    beside = ways["round"].where(ways["round"] != "", ways["beside_round"])
+    at, ours, lines = [ways["machine"], ways["scene"], beside], ways["owner"] == "ours", []
     for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
-        fastest = ways.groupby(["n", "scene", "owner"])[seconds].min().unstack("owner")
+        own = ways[seconds].where(ours)
+        alone = own.where(beside == "").groupby(ways["scene"]).transform("min")
+        times = (ways[seconds] / own.groupby(at).transform("min")).where(~ours | (beside == ""))
+        ways = ways.assign(fastest=times * alone)
+        fastest = ways.groupby(["n", "scene", "owner"])["fastest"].min().unstack("owner")
         solved = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
         lines += [
             {"question": question, "n": n} | against_ours(of_size) for n, of_size in solved.groupby("n")

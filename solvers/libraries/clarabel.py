@@ -49,6 +49,7 @@ class Clarabel(Library):
         settings = self.defaults()
         settings.verbose = False
         settings.max_iter = 500
+        settings.time_limit = self.time_limit_s
         settings.tol_feas = tolerance
         settings.tol_gap_abs = gap_tolerance(tolerance, load)
         settings.tol_gap_rel = 0.0

@@ -18,6 +18,7 @@ STATUS: dict[int, Status] = {
     int(osqp.SolverStatus.OSQP_SOLVED_INACCURATE): "inaccurate",
     int(osqp.SolverStatus.OSQP_MAX_ITER_REACHED): "iteration_limit",
 }
+NO_TIME_LIMIT = 1e10  # s, OSQP's default
 RHO_BY_ITERATIONS = 1  # OSQP_ADAPTIVE_RHO_UPDATE_ITERATIONS
 POLISH = {0: "not tried", 1: "accepted", 2: "nothing active", -1: "rejected", -2: "failed"}
 
@@ -48,6 +49,7 @@ class Osqp(Library):
             "eps_rel": 0.0,
             "check_dualgap": True,
             "max_iter": 1_000_000,
+            "time_limit": min(self.time_limit_s, NO_TIME_LIMIT),
             "adaptive_rho": RHO_BY_ITERATIONS,
             "adaptive_rho_interval": 50,
             "verbose": False,

@@ -8,6 +8,7 @@ keeps a dense matrix of the order of the free unknowns.
 """
 
 from collections.abc import Callable
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,8 @@ TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "qtqp": lambda tol, gap: {"tol_feas": tol, "tol_gap_abs": gap, "tol_gap_rel": 0.0, "max_iter": 1_000},
     "scs": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "max_iters": 10_000_000},
 }
-
+#: The option of a limit in seconds, of those that give their last iterate then.
+TIME_LIMIT = {"highs": "time_limit", "qpalm": "time_limit", "scs": "time_limit_secs"}
 
 #: The solvers that overwrite P with its factor.
 OVERWRITE = ("pyqpmad",)
@@ -81,6 +83,8 @@ class QpSolvers(Solver):
         options = TOLERANCE.get(self.name)
         details: dict[str, Any] = {} if options else {"tolerance": "not taken"}
         settings = options(tolerance, gap_tolerance(tolerance, load)) if options else {}
+        if self.name in TIME_LIMIT and isfinite(self.time_limit_s):
+            settings[TIME_LIMIT[self.name]] = self.time_limit_s
         try:
             solution = qpsolvers.solve_problem(problem, self.name, **settings | self.settings)
         except QPError as error:

@@ -38,6 +38,7 @@ class ProjectedGaussSeidel(Method):
     relaxation : ω.
     """
 
+    distribution = "scipy"
     relaxation: float = 1.5
 
     def __post_init__(self) -> None:

@@ -28,6 +28,8 @@ class TextbookActiveSet(Method):
     Iterations are the sets, each factored anew.
     """
 
+    distribution = "scipy"
+
     def solved(self, ready: State, load: DualLoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
         closed = p > 0 if ready.start is None else ready.start.lam > 0

@@ -61,10 +61,11 @@ def test_the_scenes_of_a_version_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(problems.random_scenes, "__version__", "9.9.9")
     lines = (PUBLISHED / "speed" / "problems.jsonl").read_text("utf-8").splitlines()
     published = {row["scene"]: row["scene_key"] for row in map(json.loads, lines)}
-    assert len(published) == 9
+    assert len(published) >= 9
     for name, key in published.items():
-        assert read_scene(f"{name}@0.3.0").key == key
-        assert read_scene(name).key != key
+        drawn, _, version = name.partition("@")
+        assert read_scene(f"{drawn}@{version or '0.3.0'}").key == key
+        assert read_scene(drawn).key != key
     assert drawn_names("drawn/4386/1..2@0.3.0") == ["drawn/4386/1@0.3.0", "drawn/4386/2@0.3.0"]
     joint = "drawn/superelements/0"
     assert read_scene(f"{joint}@9.9.9").key == read_scene(joint).key != read_scene(f"{joint}@0.3.0").key

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from synthetic_results import results, row
 
+from report.results.reader import read
 from report.sections import time_to_solution
 from report.sections.time_to_solution import FROM_SCENE, ONE_MORE, ours_and_others
 from studies.publish import in_series
@@ -51,6 +52,21 @@ def test_the_fastest_of_each_owner_scene_by_scene(tmp_path: Path) -> None:
     assert first["seconds"] == pytest.approx(1.5)
     assert first["library_least"] == pytest.approx(3.5 / 1.5)
     assert first["textbook_least"] == pytest.approx(7.4 / 1.5)
+
+
+def test_a_round_on_a_slower_machine_has_the_same_ratios(tmp_path: Path) -> None:
+    """What was measured beside it is compared with it alone; ours in seconds is what stands by itself."""
+    when, made = "2026-01-01T00:00:00+00:00", []
+    for each in rows():
+        slower = each | {"machine": "Slower CPU", "solve_s": 7 * each["solve_s"], "beside_round": when}
+        again = slower | {"round": when, "beside_round": None}
+        made += [slower] if each["owner"] == "library" else [each, again]
+    ratios, expected = (
+        table(tmp_path / "two", made).loc[ONE_MORE],
+        table(tmp_path / "one", rows()).loc[ONE_MORE],
+    )
+    assert ratios.to_dict() == pytest.approx(expected.to_dict())
+    assert not read(tmp_path / "two").rows["round"].any()
 
 
 def test_what_no_library_solves_counts_as_more(tmp_path: Path) -> None:

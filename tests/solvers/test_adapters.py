@@ -18,7 +18,7 @@ from solvers.adapter import clipped, dense, upper_triangle
 from solvers.base import DENSE_FORMS, FORMS, Answer, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
 from solvers.libraries.proxqp import ProxQp
-from solvers.libraries.qpsolvers import TOLERANCE
+from solvers.libraries.qpsolvers import TIME_LIMIT, TOLERANCE
 from solvers.registry import make_solver
 
 LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")
@@ -191,6 +191,20 @@ def test_a_stopped_solver_does_not_say_solved(name: str) -> None:
     prepared = make_strips(40)
     _, load = make_load(15, prepared)
     assert solved(name, {}, prepared, load, 1e-300, "primal").status != "solved"
+
+
+@pytest.mark.parametrize("form", DENSE_FORMS)
+@pytest.mark.parametrize("name", sorted({"osqp", "clarabel", *TIME_LIMIT} & set(TESTED)))
+def test_out_of_time_it_gives_its_last_iterate(name: str, form: Form) -> None:
+    prepared = make_strips(100)
+    case, load = make_load(3, prepared, force=50.0)
+    solver, given = make_solver(name, {}), load if form == "dual" else case
+    solver.time_limit_s = 1e-6
+    ready = solver.setup(solver.convert(problem_in(prepared, form)), given, 1e-12)
+    answer = solver.solve(ready, given, 1e-12)
+    assert answer.status != "solved"
+    assert answer.lam is not None
+    assert (answer.x is None) is (form == "dual")
 
 
 def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
