@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial, update_wrapper
+from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -87,7 +89,53 @@ Scheduler = Annotated[
 Share = Annotated[
     float | None, option("SHARE", "Of the cases that must keep the gap.  [default: 0.95]", min=0.01, max=1.0)
 ]
+ShareOfCases = Annotated[
+    float | None,
+    option("SHARE", "Of the cases that must keep the limits.  [default: 0.95; of one, 1]"),
+]
 Resolution = Annotated[float | None, option("SHARE", "Of the range that is told apart.  [default: 0.01]")]
+
+
+def _load_cases(
+    cases: Cases = None,
+    seed: Seed = None,
+    mean: Mean = None,
+    sd: Spread = None,
+    correlation_length: Length = None,
+    around: Around = None,
+    gaps: Gaps = None,
+    scans: Scans = None,
+    variance: Variance = None,
+    columns: Columns = None,
+    missing: Missing = None,
+) -> Any:
+    from harness.series.load_case_source import GapCases
+
+    sources = around, gaps, table_options(columns, missing), (), None, scans, variance
+    return GapCases(cases, seed, mean, sd, correlation_length, *sources)
+
+
+def with_load_cases(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with the options of load cases in place of its argument `source`, which makes GapCases of
+    them.
+    """
+    shared = signature(_load_cases, eval_str=True).parameters
+    parameters = dict(signature(command, eval_str=True).parameters)
+    at = list(parameters).index("source")
+    del parameters["source"]
+    own = list(parameters.values())
+    whole = Signature([*own[:at], *shared.values(), *own[at:]])
+
+    def run(*arguments: Any, **words: Any) -> None:
+        values = whole.bind(*arguments, **words)
+        values.apply_defaults()
+        source = partial(_load_cases, **{name: values.arguments.pop(name) for name in shared})
+        command(**values.arguments, source=source)
+
+    update_wrapper(run, command, assigned=("__module__", "__name__", "__qualname__", "__doc__"))
+    run.__dict__["__signature__"] = whole
+    run.__annotations__ = {name: parameter.annotation for name, parameter in whole.parameters.items()}
+    return run
 
 
 @contextmanager

@@ -1,8 +1,9 @@
 """The command `place`: where fasteners go."""
 
 import signal
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -10,6 +11,7 @@ from . import options
 from .options import error_reporting, option
 
 
+@options.with_load_cases
 def place(
     scene: options.SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
@@ -24,21 +26,9 @@ def place(
         float | None, option("MM", "Find the fewest fasteners that leave no larger gap.", min=0.0)
     ] = None,
     count: Annotated[int | None, option("N", "Find the best N fasteners instead.", min=1)] = None,
-    share: Annotated[
-        float | None,
-        option("SHARE", "Of the cases that must keep it.  [default: 0.95; of one, 1]", min=0.01, max=1.0),
-    ] = None,
-    cases: options.Cases = None,
-    seed: options.Seed = None,
-    mean: options.Mean = None,
-    sd: options.Spread = None,
-    correlation_length: options.Length = None,
-    around: options.Around = None,
-    gaps: options.Gaps = None,
-    scans: options.Scans = None,
-    variance: options.Variance = None,
-    columns: options.Columns = None,
-    missing: options.Missing = None,
+    share: options.ShareOfCases = None,
+    *,
+    source: Callable[[], Any],
     scheduler: options.Scheduler = None,
 ) -> None:
     """Find the fewest fasteners that keep a gap in most load cases, or the best N, and their order.
@@ -62,13 +52,10 @@ def place(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
         from harness.placement.run import place as place_fasteners
-        from harness.series.load_case_source import GapCases
         from harness.terminal import DONE, GAP_EXCEEDED
         from harness.terminal.console import ConsoleReporter
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        read_by = options.table_options(columns, missing)
-        sources = around, gaps, read_by, (), None, scans, variance
         placement = place_fasteners(
             scene,
             out,
@@ -76,7 +63,7 @@ def place(
             allow_gap_mm=allow_gap,
             count=count,
             share=share,
-            cases=GapCases(cases, seed, mean, sd, correlation_length, *sources),
+            cases=source(),
             scheduler=scheduler,
             reporter=ConsoleReporter(console, plain=True),
         )

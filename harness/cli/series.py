@@ -1,55 +1,37 @@
 """The command `series`: many load cases on one assembly."""
 
 import signal
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from .options import (
     AllowGap,
-    Around,
-    Cases,
-    Columns,
     FormName,
-    Gaps,
-    Length,
-    Mean,
     MemoryLimit,
-    Missing,
     Plugin,
     Resolution,
-    Scans,
     SceneName,
     Scheduler,
-    Seed,
     Share,
-    Spread,
-    Variance,
     error_reporting,
     option,
-    table_options,
+    with_load_cases,
 )
 
 
+@with_load_cases
 def series(
     scene: SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
-    cases: Cases = None,
-    seed: Seed = None,
-    mean: Mean = None,
-    sd: Spread = None,
-    correlation_length: Length = None,
-    around: Around = None,
-    gaps: Gaps = None,
-    scans: Scans = None,
-    variance: Variance = None,
+    source: Callable[[], Any],
     random: Annotated[
         list[str] | None,
         option("KEY=LAW", "A random key, as fasteners.preload='normal(1000, 100)'. Repeatable."),
     ] = None,
-    columns: Columns = None,
-    missing: Missing = None,
     sweep: Annotated[
         list[str] | None,
         option("KEY=VALUES", "A key of the scene and its values. Repeatable, for all combinations."),
@@ -118,28 +100,25 @@ def series(
     with error_reporting() as console:
         from harness.commands.limit_search import tolerance as find_limit
         from harness.commands.load_case_series import run_series
-        from harness.series.load_case_source import GapCases
         from harness.series.session import SeriesOptions
         from harness.terminal.console import ConsoleReporter, show_verdict
         from problems.errors import InputError
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        read_by = table_options(columns, missing)
-        sources = around, gaps, read_by, tuple(random or ()), contributors, scans, variance
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
-        source = GapCases(cases, seed, mean, sd, correlation_length, *sources)
+        cases = replace(source(), random=tuple(random or ()), contributors=contributors)
         settings = SeriesOptions(solver, form, *accuracy, threads, plugin, *limits)
         if find or share or resolution:
             if sweep or not find or allow_gap is None:
                 raise InputError.one("--find", "KEY=LOW:HIGH", find, "with --allow-gap, without --sweep")
             goal, told = (allow_gap, share or 0.95, resolution or 0.01), ConsoleReporter(console, plain=True)
-            answer = find_limit(scene, out, find, *goal, source, settings, scheduler, told)
+            answer = find_limit(scene, out, find, *goal, cases, settings, scheduler, told)
             kind = "pass" if answer.passed else "fail"
             raise typer.Exit(show_verdict(kind, answer.sentences, console))
         outcome = run_series(
             scene,
             out,
-            source,
+            cases,
             settings,
             sweep=sweep or (),
             allow_gap_mm=allow_gap,

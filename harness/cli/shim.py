@@ -1,8 +1,9 @@
 """The command `shim`: what goes between the parts."""
 
 import signal
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,6 +13,7 @@ from .options import error_reporting, option
 CSV = "x_min, x_max, y_min, y_max in mm, perhaps name"
 
 
+@options.with_load_cases
 def shim(
     scene: options.SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
@@ -24,20 +26,9 @@ def shim(
     allow_stress: Annotated[
         float | None, option("MPA", "The largest von Mises stress allowed, N/mm².")
     ] = None,
-    share: Annotated[
-        float | None, option("SHARE", "Of the cases that must keep all limits.  [default: 0.95; of one, 1]")
-    ] = None,
-    cases: options.Cases = None,
-    seed: options.Seed = None,
-    mean: options.Mean = None,
-    sd: options.Spread = None,
-    correlation_length: options.Length = None,
-    around: options.Around = None,
-    gaps: options.Gaps = None,
-    scans: options.Scans = None,
-    variance: options.Variance = None,
-    columns: options.Columns = None,
-    missing: options.Missing = None,
+    share: options.ShareOfCases = None,
+    *,
+    source: Callable[[], Any],
     scheduler: options.Scheduler = None,
 ) -> None:
     """Find the fewest shims from a stock, then the least, that keep a gap after fastening.
@@ -58,14 +49,11 @@ def shim(
     with error_reporting(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
-        from harness.series.load_case_source import GapCases
         from harness.shimming.run import shim as find_shims
         from harness.terminal import DONE, GAP_EXCEEDED
         from harness.terminal.console import ConsoleReporter
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        read_by = options.table_options(columns, missing)
-        sources = around, gaps, read_by, (), None, scans, variance
         shims = find_shims(
             scene,
             out,
@@ -75,7 +63,7 @@ def shim(
             allow_force=allow_force,
             allow_stress=allow_stress,
             share=share,
-            cases=GapCases(cases, seed, mean, sd, correlation_length, *sources),
+            cases=source(),
             scheduler=scheduler,
             reporter=ConsoleReporter(console, plain=True),
         )

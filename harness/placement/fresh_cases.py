@@ -29,6 +29,7 @@ from report.document.numbers import counted
 ALPHA = 0.05
 CONFIDENCE = 1 - ALPHA
 POWER = 0.8
+SHARE = 0.95
 ROUNDS = 4
 MOST = 10**7  # fresh cases
 
@@ -42,6 +43,11 @@ class Goal:
     limit_mm: float | None
     share: float
     count: int | None
+
+    @classmethod
+    def of(cls, cases: int, limit_mm: float | None, share: float | None, count: int | None = None) -> "Goal":
+        """share : by default 0.95, of a single case 1."""
+        return cls(limit_mm, share or (1.0 if cases == 1 else SHARE), count)
 
     def allowed(self, cases: int) -> int:
         """How many of the `cases` that choose a plan may fail. Raises InputError if they are too few to show

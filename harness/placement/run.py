@@ -8,9 +8,7 @@ import tomllib
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -27,7 +25,7 @@ from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints
 from harness.scene.allowed_gap import refuse_unusable
-from harness.scene.scene_file import MOVED, edited, with_fasteners, with_gaps
+from harness.scene.scene_file import MOVED, edited, with_fasteners
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
@@ -160,11 +158,13 @@ def place(
     study = FastenerStudy(movable.bare, cases_of(movable.scene), form, movable)
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
-    share = share if share is not None else 1.0 if study.cases.count == 1 else 0.95
-    goal = Goal(allow_gap_mm, share, count)
+    goal = Goal.of(study.cases.count, allow_gap_mm, share, count)
     order = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
     law = other_gaps(study.bare, study.cases)
-    text_of = partial(_scene_text, source, directory, law, movable.fastener.preload)
+
+    def text_of(plan: Plan) -> str:
+        return edited(source, directory, with_fasteners(plan, movable.fastener.preload), MOVED, law)
+
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
@@ -204,17 +204,6 @@ def place(
         steps = zip(result.order[1:], result.order, strict=False)
         added = tuple(next(iter(set(step.plan) - set(earlier.plan))) for step, earlier in steps)
         return Placement(plans.get("plan"), added, passed, words, write(directory))
-
-
-def _scene_text(source: str, directory: Path, law: RandomGaps | None, preload: Any, plan: Plan) -> str:
-    """The scene's file with the fasteners of a plan, and with the random gaps of `law` if there are any."""
-
-    def change(document: Any) -> None:
-        with_fasteners(plan, preload)(document)
-        if law is not None:
-            with_gaps(law)(document)
-
-    return edited(source, directory, change, MOVED if law is None else (*MOVED, "initial_gap"))
 
 
 def _written_scene(

@@ -18,9 +18,15 @@ MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes", "stress", "stress_points")  # may be relative paths
 
 
-def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequence[str]) -> str:
+def edited(
+    source: str,
+    folder: Path,
+    change: Callable[[Any], None],
+    kinds: Sequence[str],
+    law: RandomGaps | None = None,
+) -> str:
     """The changed text of a scene's file, with paths relative to `folder`. kinds : the kinds of effects that
-    change.
+    change. law : random gaps in place of the scene's.
 
     Raises InputError if the scene has no file, as a rung of a ladder, or if its assembly has such effects.
     """
@@ -33,10 +39,13 @@ def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequ
         document, home = tomlkit.parse(read_text(path, "file", TOML_MIB, strict=True)), path.parent
     if "assembly" in document:
         there = read_toml(assembly := assembly_path(home / "scene", document["assembly"])).get("effect", [])
-        if wrong := [table["kind"] for table in there if table.get("kind") in kinds]:
+        changed = (*kinds, "initial_gap") if law else kinds
+        if wrong := [table["kind"] for table in there if table.get("kind") in changed]:
             raise InputError.one(
                 assembly, "effect", wrong, "these in the scene itself, where they can change"
             )
+    if law:
+        with_gaps(law)(document)
     change(document)
     for inner in _tables(document):
         for key in FILES:

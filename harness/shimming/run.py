@@ -20,7 +20,7 @@ from harness.results.provenance import installed_version, provenance
 from harness.scene.allowed_gap import check_answer
 from harness.scene.fastener_forces import fastener_forces
 from harness.scene.mesh_error import estimated, mesh_record
-from harness.scene.scene_file import edited, with_gaps
+from harness.scene.scene_file import edited
 from harness.scene.solution import solve
 from harness.scene.stress import refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
@@ -151,7 +151,7 @@ def shim(
     made = Listed((load_case(bare, form),)) if single else cases.of(bare, form)
     for sentence in (*bare.unusual, *made.notes):
         reporter.say(sentence)
-    goal = Goal(allow_gap_mm, share or (1.0 if made.count == 1 else 0.95), None)
+    goal = Goal.of(made.count, allow_gap_mm, share)
     order = Cases.of(made.count, isinstance(made, MeasuredGaps), goal)
     there = patches_of(bare.joint, None if patches is None else str(patches))
     study = ShimStudy(bare, made, form, there, (allow_force or inf, allow_stress or inf))
@@ -159,14 +159,12 @@ def shim(
 
     def text(shims: list[Shims]) -> str:
         def change(document: Any) -> None:
-            if law is not None:
-                with_gaps(law)(document)
             for one in shims:
                 table = tomlkit.table()
                 table.update(one.model_dump(mode="json", exclude_none=True))
                 document.setdefault("effect", tomlkit.aot()).append(table)
 
-        return edited(source, directory, change, () if law is None else ("initial_gap",))
+        return edited(source, directory, change, (), law)
 
     text([])  # refused now rather than after the search
     asked |= {"share": goal.share, "stock": list(thicknesses)}
