@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from problems.effects.measured_gap import MeasuredGap
 from problems.model.effect import Effect, SpringEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
@@ -118,6 +119,14 @@ def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:
         "stiffness.dense_block.DenseBlock.compliance",
     ):
         monkeypatch.setattr(f"problems.{stage}", lambda *_: pytest.fail("built a second time"))
+
+
+def with_gap(scene: JointScene, gap: Any) -> JointScene:
+    """The scene with these gaps at its contacts, (m,) mm, in place of the random ones."""
+    places = np.concatenate([scene.joint.places(pair) for pair in scene.joint.pairs])
+    measured = MeasuredGap(kind="measured_gap", points=tuple(map(tuple, np.column_stack([places, gap]))))
+    rest = (effect for effect in scene.effects if effect.kind != "initial_gap")
+    return replace(scene, effects=(*rest, measured))
 
 
 def untied(scene: JointScene) -> JointScene:

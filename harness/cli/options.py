@@ -119,12 +119,9 @@ def with_load_cases(command: Callable[..., None]) -> Callable[..., None]:
     """The command with the options of load cases in place of its argument `source`, which makes GapCases of
     them.
     """
-    shared = signature(_load_cases, eval_str=True).parameters
-    parameters = dict(signature(command, eval_str=True).parameters)
-    at = list(parameters).index("source")
-    del parameters["source"]
-    own = list(parameters.values())
-    whole = Signature([*own[:at], *shared.values(), *own[at:]])
+    shared, own = (signature(some, eval_str=True).parameters for some in (_load_cases, command))
+    in_turn = [shared.values() if name == "source" else [one] for name, one in own.items()]
+    whole = Signature([one for some in in_turn for one in some])
 
     def run(*arguments: Any, **words: Any) -> None:
         values = whole.bind(*arguments, **words)

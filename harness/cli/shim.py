@@ -10,7 +10,7 @@ import typer
 from . import options
 from .options import error_reporting, option
 
-CSV = "x_min, x_max, y_min, y_max in mm, perhaps name"
+CSV = "x_min, x_max, y_min, y_max in mm, or outlines: name, x, y"
 
 
 @options.with_load_cases
@@ -20,13 +20,16 @@ def shim(
     allow_gap: Annotated[float, option("MM", "The largest gap allowed after fastening.")],
     stock: Annotated[str, option("MM", "Thicknesses: 0.2,0.3,0.5, or FIRST:LAST:STEP, as 0.05:1.0:0.05.")],
     patches: Annotated[
-        str | None, option("PATCHES", f"Columns x rows, as 8x1, or a CSV with {CSV}.  [default: 16 cells]")
+        str | None, option("PATCHES", f"Columns x rows, as 8x1, or a CSV with {CSV}.  [default: by the gap]")
     ] = None,
     allow_force: Annotated[float | None, option("N", "The largest force allowed in a fastener.")] = None,
     allow_stress: Annotated[
         float | None, option("MPA", "The largest von Mises stress allowed, N/mm².")
     ] = None,
     share: options.ShareOfCases = None,
+    each: Annotated[
+        bool, typer.Option("--each", help="Each case has shims of its own: what stock do all of them need?")
+    ] = False,
     *,
     source: Callable[[], Any],
     scheduler: options.Scheduler = None,
@@ -63,6 +66,7 @@ def shim(
             allow_force=allow_force,
             allow_stress=allow_stress,
             share=share,
+            each=each,
             cases=source(),
             scheduler=scheduler,
             reporter=ConsoleReporter(console, plain=True),

@@ -70,4 +70,5 @@ class AnswerJournal:
 
 def _outcome(row: dict[str, Any]) -> Outcome:
     largest = tuple(inf if value is None else value for value in row["largest"])
-    return Outcome(largest, tuple(row["contact"]), tuple(row["mean"]), tuple(map(tuple, row["further"])))
+    further, plan = (tuple(map(tuple, row[name])) for name in ("further", "plan"))
+    return Outcome(largest, tuple(row["contact"]), tuple(row["mean"]), further, plan)

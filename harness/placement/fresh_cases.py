@@ -37,17 +37,18 @@ MOST = 10**7  # fresh cases
 @dataclass(frozen=True)
 class Goal:
     """What is searched for: the fewest fasteners with which at least `share` of the cases keep limit_mm, or
-    the best plan of `count` fasteners.
+    the best plan of `count` fasteners. also : other limits, in words.
     """
 
     limit_mm: float | None
     share: float
-    count: int | None
+    count: int | None = None
+    also: str = ""
 
-    @classmethod
-    def of(cls, cases: int, limit_mm: float | None, share: float | None, count: int | None = None) -> "Goal":
-        """share : by default 0.95, of a single case 1."""
-        return cls(limit_mm, share or (1.0 if cases == 1 else SHARE), count)
+    @staticmethod
+    def share_of(share: float | None, cases: int) -> float:
+        """The share that is asked for, by default 0.95, of a single case 1."""
+        return share or (1.0 if cases == 1 else SHARE)
 
     def allowed(self, cases: int) -> int:
         """How many of the `cases` that choose a plan may fail. Raises InputError if they are too few to show
@@ -144,12 +145,13 @@ class Sample:
         """3 fasteners keep 0.12 mm in 96.7 % of 300 fresh cases (95 % interval 94.0 to 98.4 %)"""
         step, cases = self.step, len(self.numbers)
         plan = f"{which}{counted(len(step.plan), self.item)} {'keeps' if len(step.plan) == 1 else 'keep'}"
+        plan = plan if step.plan else f"joints without a {self.item} keep"
         digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
         share, low, high = (f"{100 * value:.{digits}f}" for value in (self.kept / cases, *self.interval))
-        limit = f"{step.gap_mm:.3g}" if goal.limit_mm is None else f"{goal.limit_mm:g}"
+        limit = f"{step.gap_mm:.3g} mm" if goal.limit_mm is None else f"{goal.limit_mm:g} mm{goal.also}"
         of = f"all {cases}" if self.kept == cases > 1 else f"{share} % of {cases}"
         interval = f"{100 * CONFIDENCE:g} % interval {low} to {high} %"
-        return f"{plan} {limit} mm in {of} {self.cases} ({interval})"
+        return f"{plan} {limit} in {of} {self.cases} ({interval})"
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,10 @@ class PlanSearch(ABC):
     def once(self, current: Plan, count: int | None) -> tuple[list[Step], Step]:
         """All plans kept, and the best. current : the scene's own. count : of its items; None: the fewest."""
 
+    def used(self, step: Step) -> str:
+        """How much a plan needs of the limits, in words."""
+        return f"{step.gap_mm:.3g} mm"
+
     def order_of(self, best: Step) -> list[Step]:
         """The plans with 0, 1, … items set, up to the best."""
         return [best]
@@ -86,7 +90,7 @@ class PlanSearch(ABC):
         ]
         for step in steps:
             proven = counted(next(self.proven), "plan")
-            words = f"{counted(len(step.plan), self.item)}, {step.moved}: {step.gap_mm:.3g} mm"
+            words = f"{counted(len(step.plan), self.item)}, {step.moved}: {self.used(step)}"
             self.reporter.progress(f"{words} ({proven} proven)")
         return steps
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -158,12 +159,13 @@ def place(
     study = FastenerStudy(movable.bare, cases_of(movable.scene), form, movable)
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
-    goal = Goal.of(study.cases.count, allow_gap_mm, share, count)
+    goal = Goal(allow_gap_mm, Goal.share_of(share, study.cases.count), count)
     order = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
     law = other_gaps(study.bare, study.cases)
+    preload: Any = movable.fastener.preload
 
     def text_of(plan: Plan) -> str:
-        return edited(source, directory, with_fasteners(plan, movable.fastener.preload), MOVED, law)
+        return edited(source, directory, with_fasteners(plan, preload), MOVED, law)
 
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}

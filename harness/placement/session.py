@@ -99,19 +99,24 @@ class Question:
     cases: tuple[int, ...]
     base: Plan | None = None
 
+    def answered(self, session: "PlanSession") -> list["Outcome"]:
+        """The outcome of each plan."""
+        return session.answer(self)
+
 
 @dataclass(frozen=True)
 class Outcome:
     """The gaps y of a plan, one entry per case.
 
     largest : the largest gap, mm; of a proven answer an upper bound on it. contact : where it is. mean :
-    (Σ y⁸ / m)^⅛, mm. further : see `Study.further`.
+    (Σ y⁸ / m)^⅛, mm. further : see `Study.further`. plan : that of a question which searches for one.
     """
 
     largest: tuple[float, ...]
     contact: tuple[int, ...]
     mean: tuple[float, ...]
     further: tuple[tuple[float, ...], ...] = ()
+    plan: Plan = ()
 
 
 class StiffnessSession:
@@ -276,4 +281,4 @@ def answer(task: tuple[Study, Question]) -> list[Outcome]:
     if study.key not in _sessions:
         _sessions.clear()
         _sessions[study.key] = PlanSession(study)
-    return _sessions[study.key].answer(question)
+    return question.answered(_sessions[study.key])

@@ -5,6 +5,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,12 @@ def provenance() -> Provenance:
         return {"commit": __version__, "clean": None}
     changes = _git("status", "--porcelain", "--untracked-files=all", "--", *CODE)
     return {"commit": digits.strip(), "clean": None if changes is None else not changes}
+
+
+def stamp() -> dict[str, Any]:
+    """Machine, version, commit and time of a record."""
+    origin = {"machine": machine()["machine"], "version": installed_version("rivetbench"), **provenance()}
+    return origin | {"recorded_at": datetime.now(UTC).isoformat(timespec="seconds")}
 
 
 def fingerprints(files: Iterable[Path]) -> dict[str, str]:

@@ -5,19 +5,12 @@ also says where parts and contacts are in x and λ, what a picture marks, and th
 """
 
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from harness.results.provenance import (
-    fingerprints,
-    installed_version,
-    machine,
-    provenance,
-    resident_mib,
-)
+from harness.results.provenance import fingerprints, resident_mib, stamp
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, Vector
@@ -83,10 +76,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "skipped": list(_skipped(solution, built, solver)),
         "steps": solution.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
-        "machine": machine()["machine"],
-        "version": installed_version("rivetbench"),
-        **provenance(),
-        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        **stamp(),
     }
 
 

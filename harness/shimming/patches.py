@@ -1,32 +1,42 @@
 """The patches of the junction that shims may fill, and the thicknesses in stock."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import groupby, pairwise, product
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
-from harness.placement.candidates import ROWS_AND_COLUMNS
+from harness.placement.candidates import ROWS_AND_COLUMNS, Place
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
-from problems.forms.assembly import Matrix
-from problems.input.tables import read_columns
+from problems.input.tables import CSV_MIB, Cells, read_columns
 from problems.model.interface import AnyJoint, on_junction
+from problems.model.joint import Pair
+from problems.model.surface_cells import cross
 
 MOST, USUAL = 1000, 16  # patches, and thicknesses; patches if none are given
 NEAR = 1e-6  # mm: closer borders are one
+BORDERS, CORNERS = ("x_min", "x_max", "y_min", "y_max"), ("x", "y")
+SHAPE = "x_min < x_max and y_min < y_max, or 3 corners or more, each with the name of the outline"
+Shape = tuple[str, tuple[Place, ...], str]  # name, corners, and where it is in its file
 STOCK = "thicknesses above 0 mm in ascending order, as 0.2,0.3,0.5, or FIRST:LAST:STEP"
 
 
 @dataclass(frozen=True)
 class Patch:
-    """x, y : the range of the shim as it is cut, mm. area : mm². shim : the effect, 1 mm thick."""
+    """outline : the corners of the shim as it is cut, mm. shim : the effect, 1 mm thick."""
 
     name: str
-    x: tuple[float, float]
-    y: tuple[float, float]
-    area: float
+    outline: tuple[Place, ...]
     shim: Shims
+
+    @property
+    def area(self) -> float:
+        """mm²."""
+        corners = np.array(self.outline)
+        return float(abs(cross(corners, np.roll(corners, -1, axis=0)).sum()) / 2)
 
 
 def stock_of(text: str) -> tuple[float, ...]:
@@ -46,10 +56,10 @@ def stock_of(text: str) -> tuple[float, ...]:
 def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
     """The patches, in each contact of the joint. Raises InputError.
 
-    source : columns x rows of equal cells of the junction, as 8x1, or the path of a CSV with columns x_min,
-    x_max, y_min, y_max, mm, perhaps name; None: USUAL cells, about square.
+    source : columns x rows of equal cells of the junction, as 8x1, or the path of a CSV, mm: rectangles in
+    columns x_min, x_max, y_min, y_max, perhaps name, or corners of outlines in columns name, x and y; None:
+    USUAL cells, about square.
     """
-    names: list[str] = []
     if source is None:
         length, width = np.ptp(joint.bounds, axis=0)
         columns = int(np.clip(round((USUAL * length / width) ** 0.5), 1, USUAL))
@@ -60,54 +70,50 @@ def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
             allowed = f"columns x rows, 1 to {MOST} patches, or a CSV file"
             raise InputError.one("--patches", "patches", source, allowed)
         x, y = (np.linspace(low, high, n + 1) for (low, high), n in zip(joint.bounds.T, counts, strict=True))
-        cells = np.array([(*across, *up) for up, across in product(pairwise(y), pairwise(x))])
-        faults = []
-    else:
-        table = read_columns(Path(source), ("x_min", "x_max", "y_min", "y_max"))
-        cells, names = np.array(table.rows).reshape(-1, 4), table.words["name"]
-        faults = table.faults + _faults(joint, cells, source, table.lines)
-    patches = []
-    for pair in joint.pairs if not faults else ():
+        cells = product(pairwise(y.tolist()), pairwise(x.tolist()))
+        shapes = [(str(k), corners_of(*across, *up), "") for k, (up, across) in enumerate(cells, start=1)]
+        return made(joint, shapes, joint.pairs)
+    cut = not Cells.of(Path(source), CSV_MIB, BORDERS).header
+    table, shapes = read_columns(Path(source), CORNERS if cut else BORDERS), []
+    names = table.words["name"] or [str(k + 1) for k in range(len(table.rows))]
+    rows = zip(names, table.rows, table.lines, strict=True)
+    for _, group in groupby(rows, itemgetter(0 if cut else 2)):
+        (name, *_), corners, (line, *_) = zip(*group, strict=True)
+        shapes.append((name, corners if cut else corners_of(*corners[0]), f"line {line}"))
+    if table.faults:
+        raise InputError(table.faults)
+    return made(joint, shapes, joint.pairs, source)
+
+
+def corners_of(west: float, east: float, south: float, north: float) -> tuple[Place, ...]:
+    """The corners of a rectangle; none of one without width."""
+    corners = (west, south), (east, south), (east, north), (west, north)
+    return corners if west < east and south < north else ()
+
+
+def made(
+    joint: AnyJoint, shapes: Sequence[Shape], pairs: Iterable[Pair], source: str = "--patches"
+) -> tuple[Patch, ...]:
+    """A patch for each shape in each pair. Raises InputError if an outline is none, off the junction, without
+    a contact, or with one of another's.
+    """
+    low, high = joint.bounds[0] - NEAR, joint.bounds[1] + NEAR
+    faults = [Fault(source, at, outline, SHAPE) for _, outline, at in shapes if len(outline) < 3]
+    for _, outline, at in shapes:
+        off = [place for place in outline if (place < low).any() or (place > high).any()]
+        faults += [Fault(source, at, place, on_junction(joint)) for place in off[:1]]
+    patches, owner = [], np.full(joint.size[1], "", dtype=object)
+    for pair, (name, outline, at) in product(pairs, shapes):
         between, where = (None, "") if len(joint.pairs) == 1 else (pair, f" {'–'.join(pair)}")
-        for k, (w, e, s, n) in enumerate(cells.tolist()):
-            name, (west, south) = (
-                f"{names[k] if names else k + 1}{where}",
-                _inner(cells, k, joint.places(pair)),
-            )
-            shim = Shims(kind="shims", thickness=1.0, x=(west, e), y=(south, n), between=between)
-            patches.append(Patch(name, (w, e), (s, n), (e - w) * (n - s), shim))
-            faults += [Fault(source, f"patch {name}, {f[0]}", *f[1:]) for f in shim.faults(joint)]
+        if len(outline) < 3:
+            continue
+        shim = Shims(kind="shims", thickness=1.0, outline=outline, between=between)
+        patches.append(Patch(f"{name}{where}", outline, shim))
+        inside = shim.gap(joint) < 0
+        faults += [Fault(source, f"{at or name}, {f[0]}", *f[1:]) for f in shim.faults(joint)]
+        for other in sorted({*owner[inside]} - {""}):
+            faults.append(Fault(source, at or name, name, f"apart from other patches: it overlaps {other}"))
+        owner[inside] = at or name
     if faults:
         raise InputError(faults)
     return tuple(patches)
-
-
-def _faults(joint: AnyJoint, cells: Matrix, source: str, lines: list[int]) -> list[Fault]:
-    """A fault for each rectangle without width, beyond the junction, or over an earlier one."""
-    low, high, faults = cells[:, ::2], cells[:, 1::2], []
-    for k, line in enumerate(lines):
-        over = (np.minimum(high, high[k]) - np.maximum(low, low[k]) > NEAR).all(axis=1)[:k]
-        wrong = [
-            ("x_min < x_max and y_min < y_max", (low[k] >= high[k]).any()),
-            (
-                on_junction(joint),
-                (low[k] < joint.bounds[0] - NEAR).any() or (high[k] > joint.bounds[1] + NEAR).any(),
-            ),
-            (f"apart from other patches: it overlaps line {lines[over.argmax()] if k else 0}", over.any()),
-        ]
-        faults += [Fault(source, f"line {line}", cells[k].tolist(), text) for text, there in wrong if there]
-    return faults
-
-
-def _inner(cells: Matrix, k: int, places: Matrix) -> list[float]:
-    """The least x and y of patch k; where a neighbour ends with contacts on that border, half-way to the next
-    ones, since shims that overlap would add up.
-    """
-    low, high = cells[:, ::2], cells[:, 1::2]
-    inner = low[k].tolist()
-    beside = np.minimum(high, high[k]) - np.maximum(low, low[k]) > NEAR
-    for axis in (0, 1):
-        further = places[places[:, axis] > inner[axis] + NEAR, axis]
-        if ((abs(high[:, axis] - low[k, axis]) < NEAR) & beside[:, 1 - axis]).any() and len(further):
-            inner[axis] = float((inner[axis] + further.min()) / 2)
-    return inner

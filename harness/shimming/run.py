@@ -1,5 +1,6 @@
 """Searches for shims and writes them: as a scene, a table and a drawing, and as a report."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from math import inf
@@ -11,12 +12,14 @@ import tomlkit
 
 from harness.measurement.scheduler import workers
 from harness.placement.answer_journal import AnswerJournal, refuse_other_command
-from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
+from harness.placement.candidates import Plan
+from harness.placement.fresh_cases import ALPHA, Cases, Found, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
+from harness.placement.session import Outcome, PlanSession
 from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
-from harness.results.provenance import installed_version, provenance
+from harness.results.provenance import fingerprints, installed_version, stamp
 from harness.scene.allowed_gap import check_answer
 from harness.scene.fastener_forces import fastener_forces
 from harness.scene.mesh_error import estimated, mesh_record
@@ -37,14 +40,19 @@ from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from problems.storage import digest
-from report.document.numbers import counted
+from report.document.numbers import counted, position
 
-from .patches import patches_of, stock_of
+from .each import each_joint
+from .gap_regions import patches_of_gap
+from .patches import BORDERS, patches_of, stock_of
 from .search import ShimSearch, ShimStudy
 
 RECORD, ANSWERS = "shim.json", "shims.jsonl"
 MOST = 1e9  # of a limit: larger ones are none
-OUTPUTS = (RECORD, ANSWERS, "shimmed.toml", "report.md", "shims.csv", "shims.png", "forces.csv")
+UNITS = ("N", "N/mm²")  # of the limits of force and stress
+MESH = "Mesh error: not part of it; the report of a single joint has it"
+REPORT = ("report.md", "index.html", "sheet.pdf", "shims.csv", "shims.png", "forces.csv")
+OUTPUTS = (RECORD, ANSWERS, "shimmed.toml", *REPORT, "stock.csv", "stock.png", "joints.csv")
 
 
 @dataclass(frozen=True)
@@ -54,7 +62,7 @@ class Shimming:
     Parameters
     ----------
     shims : dict of str to float
-        The thickness of each shim by the name of its patch, mm.
+        The thickness of each shim by the name of its patch, mm; none if each joint has its own.
     passed : bool
         Whether the shims are shown to keep the limits.
     sentence : str
@@ -80,6 +88,7 @@ def shim(
     allow_force: float | None = None,
     allow_stress: float | None = None,
     share: float | None = None,
+    each: bool = False,
     cases: GapCases = DEFAULT,
     scheduler: str | None = None,
     reporter: Reporter = SILENT,
@@ -97,12 +106,16 @@ def shim(
     stock : str
         Thicknesses, mm: "0.2,0.3,0.5", or "0.05:1.0:0.05" from the first to the last by steps.
     patches : str or Path, optional
-        Columns x rows, as "8x1", or a CSV with columns x_min, x_max, y_min, y_max, mm, and perhaps name; by
-        default 16 cells of the junction, about square.
+        Columns x rows, as "8x1", or a CSV, mm: rectangles in columns x_min, x_max, y_min, y_max, and perhaps
+        name, or corners of outlines in columns name, x and y; by default rectangles, at most 16, around what
+        exceeds the limit after fastening.
     allow_force, allow_stress : float, optional
         The largest force in a fastener, N, and von Mises stress in a part, N/mm².
     share : float, optional
         Share of the load cases that must keep all limits; by default 0.95, of a single case 1.
+    each : bool, optional
+        Whether each load case has shims of its own, of which the record says what to order; by default one
+        set of shims is found for all.
     cases : GapCases, optional
         The load cases; by default 100 with random gaps, or the scene alone if its gaps are not random.
     scheduler : str, optional
@@ -151,10 +164,19 @@ def shim(
     made = Listed((load_case(bare, form),)) if single else cases.of(bare, form)
     for sentence in (*bare.unusual, *made.notes):
         reporter.say(sentence)
-    goal = Goal.of(made.count, allow_gap_mm, share)
-    order = Cases.of(made.count, isinstance(made, MeasuredGaps), goal)
+    limits, listed = (allow_force or inf, allow_stress or inf), isinstance(made, MeasuredGaps)
+    also = "".join(f", {most:g} {unit}" for most, unit in zip(limits, UNITS, strict=True) if most < inf)
+    goal = Goal(allow_gap_mm, Goal.share_of(share, made.count), also=also)
     there = patches_of(bare.joint, None if patches is None else str(patches))
-    study = ShimStudy(bare, made, form, there, (allow_force or inf, allow_stress or inf))
+    study = ShimStudy(bare, made, form, there, limits)
+    if each and not listed and goal.failing(made.count, ALPHA) < 0:
+        allowed = f"{made.count} cases cannot show it: take {goal.least(ALPHA / 2)}, or a share of 1"
+        raise InputError.one("--share", "share", goal.share, allowed)
+    order = Cases(range(made.count), made.count) if each else Cases.of(made.count, listed, goal)
+    if patches is None:
+        gap = PlanSession(study).gaps(order.numbers[: order.choosing]).max(axis=1)
+        there = patches_of_gap(bare.joint, gap, allow_gap_mm) or there
+        study = replace(study, patches=there)
     law = other_gaps(bare, made)
 
     def text(shims: list[Shims]) -> str:
@@ -167,7 +189,7 @@ def shim(
         return edited(source, directory, change, (), law)
 
     text([])  # refused now rather than after the search
-    asked |= {"share": goal.share, "stock": list(thicknesses)}
+    asked |= {"share": goal.share, "stock": list(thicknesses), "each": each}
     identity = asked | {
         "patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}",
         "scene_key": bare.key,
@@ -183,15 +205,24 @@ def shim(
         pool = workers(scheduler, console_of(reporter)) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
             journal = AnswerJournal(study, directory / ANSWERS, identity, executor)
-            search = ShimSearch(journal, 0, 0, allow_gap_mm, study, thicknesses, reporter=reporter)
-            result = search_in_rounds(search, (), goal, order)
+            plan: Plan = ()
+            if each:
+                joints, *pair, words, passed = each_joint(journal, study, goal, thicknesses, reporter)
+                record = {"joints": joints, "samples": [], **_figures(study, *pair)}
+                record |= {"forces": [], "sure": ["Solver: every gap is a proven upper bound", MESH]}
+            else:
+                search = ShimSearch(journal, 0, 0, allow_gap_mm, study, thicknesses, reporter=reporter)
+                result = search_in_rounds(search, (), goal, order)
+                plan, record = result.best.plan if result.best else (), _record(result, study)
+                words, passed = _sentence(result, goal, study)
         from report.writers.shim_report import write  # slow to import: not before the search
 
-        plan = result.best.plan if result.best else ()
-        records.replace_text(directory / "shimmed.toml", text([study.effect(item) for item in plan]))
-        words, passed = _sentence(result, goal, study)
-        record = {"title": bare.title, **asked, "said": words, **_record(result, study)}
-        record |= _as_solved(directory / "shimmed.toml", len(plan), allow_gap_mm) | provenance()
+        files = fingerprints([*bare.sources, *(file for file in inputs[1:] if file.is_file())])
+        record |= {"scene": bare.name, "title": bare.title, "scene_key": bare.key, "inputs": files}
+        record |= asked | {"said": words, **stamp()}
+        if not each:
+            records.replace_text(directory / "shimmed.toml", text([study.effect(item) for item in plan]))
+            record |= _as_solved(directory / "shimmed.toml", len(plan), allow_gap_mm)
         records.replace_object(directory / RECORD, record)
         return Shimming({there[int(k)].name: t for k, t in plan}, passed, words, write(directory))
 
@@ -218,42 +249,58 @@ def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
 
 def _sentence(result: Found, goal: Goal, study: ShimStudy) -> tuple[str, bool]:
     """The outcome in words, and whether the plan passed."""
-    step, sample, limit = result.best, result.samples[-1] if result.samples else None, goal.limit_mm or 0.0
+    step, sample = result.best, result.samples[-1] if result.samples else None
+    least = step or min(result.steps, key=lambda step: step.gap_mm)
+    figures = least.outcome.further[least.worst]
+    gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
+    most = "".join(f", {value:.3g} {unit}" for value, limit, unit in more if limit < inf)
+    leave = f"{gaps.max():.3g} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
     if step is None:
-        least, names = min(result.steps, key=lambda step: step.gap_mm), [p.name for p in study.patches]
-        gaps = np.array(least.outcome.further[least.worst][: len(study.masks)])
-        at = [*(f"in patch {name}" for name in names), "beyond all patches"][int(gaps.argmax())]
         words = "no shims of the stock are found with which all limits are kept; the best tried leave"
-        return f"FAIL: {words} {gaps.max():.3g} mm {at}, proven.", False
-    passed = (sample.step if sample else step).gap_mm <= limit
-    leave = "leaves" if len(step.plan) == 1 else "leave"
-    words = f"{counted(len(step.plan), 'shim')} {leave} {step.gap_mm:.3g} mm of {limit:g} mm allowed"
-    return f"{'PASS' if passed else 'FAIL'}: {sample.sentence(goal) if sample else words}, proven.", passed
+        at = [*(f"in patch {patch.name}" for patch in study.patches), "beyond all patches"]
+        return f"FAIL: {words} {leave}, the largest gap {at[int(gaps.argmax())]}, proven.", False
+    passed, count = (sample.step if sample else step).gap_mm <= (goal.limit_mm or 0.0), len(step.plan)
+    words = f"{counted(count, 'shim') if count else 'the scene'} {'leave' if count > 1 else 'leaves'} {leave}"
+    words = sample.sentence(goal) if sample else words
+    none_needed = "" if count or not passed else "no shim is needed: "
+    return f"{'PASS' if passed else 'FAIL'}: {none_needed}{words}, proven.", passed
 
 
-def _record(result: Found, study: ShimStudy) -> dict[str, Any]:
-    """Of each patch, and of all, the largest figures in the cases that chose, before, and in those that
-    decided, after; of a volume the mean.
+def _figures(study: ShimStudy, before: Sequence[Outcome], after: Sequence[Outcome]) -> dict[str, Any]:
+    """Of each patch, and of all, the largest figures in some cases without shims and in some with them; of a
+    volume the mean.
     """
-    best, count = result.best or result.steps[0], len(study.patches)
-    after = result.samples[-1].step if result.samples else best
-    old, new = (np.array(step.outcome.further) for step in (result.steps[0], after))
+    count, joint = len(study.patches), study.bare.joint
+    old, new = (np.array([row for one in some for row in one.further]) for some in (before, after))
     patches = [
-        {"patch": patch.name, "x_min": patch.x[0], "x_max": patch.x[1], "y_min": patch.y[0]}
-        | {"y_max": patch.y[1], "thickness_mm": dict(best.plan).get(k, 0.0), "area_mm2": patch.area}
+        {"patch": patch.name, "outline": patch.outline, "area_mm2": patch.area}
+        | dict(zip(BORDERS, patch.shim.ranges.ravel().tolist(), strict=True))
         | {"gap_before_mm": old[:, k].max(), "gap_after_mm": new[:, k].max()}
         | {"liquid_mm3": new[:, count + 1 + k].mean()}
         for k, patch in enumerate(study.patches)
     ]
-    names, figures = ("gap", "force", "stress"), {"before": old, "after": new}
+    names = ("gap", "force", "stress")
     whole = {
         when: dict(zip(names, (some[:, : count + 1].max(), *some[:, -2:].max(axis=0)), strict=True))
-        for when, some in figures.items()
+        for when, some in {"before": old, "after": new}.items()
     }
+    places = np.concatenate([joint.places(pair) for pair in joint.pairs])
+    contacts = [contact for one in after for contact in one.contact]
+    worst = contacts[int(new[:, : count + 1].max(axis=1).argmax())]
+    drawn = {"bounds": joint.bounds.tolist(), "marks": study.bare.marks().tolist()}
+    return {"patches": patches, **whole, **drawn, "worst_at": position(places[worst], places)}
+
+
+def _record(result: Found, study: ShimStudy) -> dict[str, Any]:
+    """The figures before, in the cases that chose, and after, in those that decided, and what was tried."""
+    best = result.best or result.steps[0]
+    after = result.samples[-1].step if result.samples else best
+    figures = _figures(study, [result.steps[0].outcome], [after.outcome])
+    for k, patch in enumerate(figures["patches"]):
+        patch["thickness_mm"] = dict(best.plan).get(k, 0.0)
     samples = [{"cases": len(s.numbers), "kept": s.kept, "interval": s.interval} for s in result.samples]
     steps = [{"moved": step.moved, "gap_mm": step.gap_mm, "plan": step.plan} for step in result.steps]
-    drawn = {"bounds": study.bare.joint.bounds.tolist(), "marks": study.bare.marks().tolist()}
-    return {"patches": patches, "samples": samples, "steps": steps, **whole, **drawn}
+    return figures | {"samples": samples, "steps": steps}
 
 
 def _as_solved(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:

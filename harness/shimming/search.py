@@ -93,6 +93,10 @@ class ShimSearch(PlanSearch):
         made = super().outcomes(plans, cases, most, base)
         return [replace(one, largest=tuple(map(used, one.further))) for one in made]
 
+    def used(self, step: Step) -> str:
+        share = f"{step.gap_mm / self.limit_mm:.1%} of the limits"
+        return super().used(step) if min(self.study.limits) == inf else share
+
     def cost(self, plan: Plan) -> tuple[float, float]:
         return len(plan), round(sum(t * self.study.patches[int(k)].area for k, t in plan), DIGITS)
 

@@ -1,42 +1,72 @@
-"""Shims: a sheet of given thickness fills the gap over a rectangle."""
+"""Shims: a sheet of given thickness fills the gap over a rectangle or a polygon."""
 
 from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded_types import Positive, Range
+from problems.input.bounded_types import Finite, Positive, Range
 from problems.model.effect import ContactEffect, Effect, GapEffect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults, Pair
 from problems.model.junction_terms import at_contacts
+from problems.model.surface_cells import cross
+
+NUDGE = 1e-6  # mm, to the left and below
+Outline = Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=3, exclude_if=lambda some: not some)]
 
 
 class Shims(ContactEffect, GapEffect):
-    """g −= thickness at every contact with x and y in the ranges, borders included; mm.
+    """g −= thickness at every contact with x and y in the ranges, borders included, or in the outline; mm.
 
-    A shim is rigid. One thicker than the gap holds the parts apart; overlapping shims add up.
+    A contact on the border of an outline belongs to what is left of and below it, as far as there is a
+    junction: of outlines that touch one has it. A shim is rigid. One thicker than the gap holds the parts
+    apart; overlapping shims add up.
     """
 
     thickness: Annotated[Positive, "mm"]
-    x: Annotated[Range, "mm"]
-    y: Annotated[Range, "mm"]
+    x: Annotated[Range | None, "mm"] = None
+    y: Annotated[Range | None, "mm"] = None
+    outline: Annotated[Outline, "mm"] = ()
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> "Shims":
+        if {self.x is None, self.y is None} != {bool(self.outline)}:
+            raise ValueError("give x and y, or outline")
+        return self
+
+    @property
+    def ranges(self) -> Matrix:
+        """(2, 2) the least and the largest x, and y, mm."""
+        if self.x is not None and self.y is not None:
+            return np.array([self.x, self.y])
+        return np.array([(min(values), max(values)) for values in zip(*self.outline, strict=True)])
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         pairs = [pair for pair in self.pairs(joint) if pair in joint.pairs]
         places = np.concatenate([np.zeros((0, 2)), *map(joint.places, pairs)])
-        if len(places) and not self._covered(places).any():
-            x, y = places[((places - np.mean([self.x, self.y], axis=1)) ** 2).sum(axis=1).argmin()]
-            yield "x, y", [list(self.x), list(self.y)], f"ranges with a node; the nearest: at {x:g}, {y:g} mm"
+        if len(places) and not self._covered(places, joint).any():
+            x, y = places[((places - self.ranges.mean(axis=1)) ** 2).sum(axis=1).argmin()]
+            yield "x, y", self.ranges.tolist(), f"ranges with a node; the nearest: at {x:g}, {y:g} mm"
 
-    def _covered(self, nodes: Matrix) -> Mask:
-        at_x, at_y = nodes.T
-        return (self.x[0] <= at_x) & (at_x <= self.x[1]) & (self.y[0] <= at_y) & (at_y <= self.y[1])
+    def _covered(self, places: Matrix, joint: AnyJoint) -> Mask:
+        """(k,) which places are in the rectangle, or in the polygon: a ray from them to the right crosses its
+        border an odd number of times.
+        """
+        if not self.outline:
+            low, high = self.ranges.T
+            return np.asarray(((low <= places) & (places <= high)).all(axis=1))
+        corners, (low, high) = np.array(self.outline), joint.bounds
+        edge, at = np.roll(corners, -1, axis=0) - corners, np.clip(places - NUDGE, low + NUDGE, high - NUDGE)
+        above = at[:, None, 1] >= corners[:, 1]
+        right = (cross(edge, at[:, None] - corners) > 0) == (edge[:, 1] > 0)
+        return np.asarray(((above != np.roll(above, -1, axis=1)) & right).sum(axis=1) % 2 == 1)
 
     def gap(self, joint: AnyJoint) -> Vector:
         def filled(pair: Pair) -> Vector:
-            return np.where(self._covered(joint.places(pair)), -self.thickness, 0.0)
+            return np.where(self._covered(joint.places(pair), joint), -self.thickness, 0.0)
 
         return at_contacts(filled, self.pairs(joint), joint)

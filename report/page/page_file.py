@@ -21,7 +21,7 @@ from report.results.series_results import Array
 
 HERE = Path(__file__).parent
 SCRIPTS = ("state", "judge", "tables", "plots", "page")
-BY_TEMPLATE = ("banner", "headline", "tables", "views", "controls", "limit")
+BY_TEMPLATE = ("banner", "headline", "tables", "views", "controls", "limit", "pictures")
 BY_BOTH = ("styles", "figures")  # by the template and the scripts
 DIGITS = 1 << 11  # what is dropped of a float32's mantissa: 3.6 decimal digits are left
 Data = dict[str, Any]

@@ -1,7 +1,10 @@
-"""Writes the report of a search for shims: report.md with a drawing, shims.csv and forces.csv."""
+"""Writes the report of a search for shims: report.md with a drawing and tables, index.html, and sheet.pdf."""
 
 import json
+from base64 import b64encode
+from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,73 +12,149 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Polygon, Rectangle
 
-from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, word
-from report.document.escape import quoted
-from report.document.numbers import significant
+from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, records, word
+from report.document.escape import plain, quoted
+from report.document.numbers import counted, significant, whole
 from report.figures import style
+from report.page.page_file import Data, banner
+from report.page.page_file import write as write_page
 from report.writers.sections_writer import written
+from report.writers.sheet import Sheet, origin, write_sheet
 
-COLUMNS = {"thickness, mm": "thickness_mm", "area, mm²": "area_mm2", "gap before, mm": "gap_before_mm"}
+COLUMNS = {"area, mm²": "area_mm2", "gap before, mm": "gap_before_mm"}
 COLUMNS |= {"gap after, mm": "gap_after_mm", "liquid shim, mm³": "liquid_mm3"}
-LIMITS = {"gap": "largest gap, mm", "force": "largest force, N", "stress": "largest stress, N/mm²"}
+FORCES = {"x, mm": "x", "y, mm": "y", "without, N": "force_N", "with shims, N": "with_shims_N"}
+LIMITS = {"gap": ("mm", "limit_mm"), "force": ("N", "allow_force"), "stress": ("N/mm²", "allow_stress")}
 NEAR = 0.9  # of the limit: a gap is at it
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report.md from the record in DIRECTORY. Returns its path."""
+    """Write DIRECTORY/report.md from the record in DIRECTORY, with index.html and sheet.pdf beside it.
+
+    Returns the path of the first.
+    """
     record = quoted(json.loads((directory / "shim.json").read_text("utf-8")))
-    patches, forces = pd.DataFrame(record["patches"]), pd.DataFrame(record["forces"])
-    shims, before, after = patches[patches["thickness_mm"] > 0], record["before"], record["after"]
-    facts = {
+    patches, title = pd.DataFrame(record["patches"]), f"Shims: {record['title']}"
+    label, what, heads = "thickness_mm", "thickness in mm", [number("thickness, mm", "thickness_mm")]
+    blocks, files = list[Block](), dict[str, pd.DataFrame]()
+    with style.applied():
+        if joints := record.get("joints"):
+            pieces = [(joint["joint"], int(k), t) for joint in joints for k, t in joint.pop("plan")]
+            table = pd.DataFrame(pieces, columns=["joint", "patch", "thickness_mm"])
+            used = table.groupby("patch").agg(joints=("joint", "size"), thickness_mm=("thickness_mm", "max"))
+            patches = patches.join(used).fillna({"joints": 0, "thickness_mm": 0.0})
+            heads = [number("joints with it", "joints", whole), number("thickest, mm", "thickness_mm")]
+            label, what = "joints", f"in how many of {counted(len(joints), 'joint')}"
+            each = table.pivot(index="joint", columns="patch", values="thickness_mm")
+            files["joints"] = pd.DataFrame(joints).join(
+                each.rename(columns=dict(enumerate(patches["patch"]))), on="joint"
+            )
+            blocks += _stock(table.join(patches["area_mm2"], on="patch"))
+        shims = patches[patches["thickness_mm"] > 0]
+        ranges = [Column(f"{axis}, mm", partial(_range, axis)) for axis in "xy"]
+        columns = [word("patch", "patch"), *ranges, *heads, *(number(*pair) for pair in COLUMNS.items())]
+        caption = "*All patches*; one without a thickness has no shim."
+        blocks.append(Table("shims", caption, patches.drop(columns="outline"), columns))
+        if len(forces := pd.DataFrame(record["forces"])):
+            of_forces = [word("kind", "kind"), *(number(*pair) for pair in FORCES.items())]
+            caption = "*Forces in fasteners* of the scene as its file has it."
+            blocks.append(Table("forces", caption, forces, of_forces))
+        facts = facts_table("", "*The question and its answer.*", _facts(record, patches, len(shims)))
+        caption = f"*The shims*: {what}; the ticks are borders in mm, rings fasteners and other marks."
+        drawing = Figure("shims", caption, _drawing(record, shims, label))
+        sections = [Section("The shims", [facts, drawing, *blocks])]
+        page = written(directory / "report.md", title, sections, files=files)
+    tables = [block for block in blocks if isinstance(block, Table)]
+    kind, picture = record["said"].partition(":")[0].lower(), directory / "shims.png"
+    code = pd.DataFrame([record])[["machine", "commit", "clean", "recorded_at"]]
+    data: Data = {
+        "headline": {"kind": kind, "text": plain(record["said"])},
+        "banner": banner(code, f"scene {plain(record['scene'])}", warnings=[]),
+        "pictures": [f"data:image/png;base64,{b64encode(picture.read_bytes()).decode()}"],
+        "tables": [_on_page(table) for table in (facts, *tables)],
+    }
+    write_page(directory / "index.html", title, data)
+    sure = [f"Largest gap: {_largest(record, 'gap', len(shims))}.", *(f"{text}." for text in record["sure"])]
+    tables = [
+        replace(table, data=shims, caption="*The shims.*") if table.name == "shims" else table
+        for table in tables
+    ]
+    about = sure, origin(record), record["inputs"], [picture], tables
+    write_sheet(directory / "sheet.pdf", Sheet(title, kind, record["said"], *about))
+    return page
+
+
+def _facts(record: dict[str, Any], patches: pd.DataFrame, shims: int) -> dict[str, str]:
+    at_limit = patches[patches["gap_after_mm"] > NEAR * record["limit_mm"]]["patch"]
+    per_joint = Counter(joint["shims"] for joint in record.get("joints", ()) if joint["kept"])
+    return {
         "found": record["said"],
         "stock": ", ".join(f"{t:g}" for t in record["stock"]) + " mm",
         "fresh cases": "; ".join(f"{s['kept']} of {s['cases']} keep all limits" for s in record["samples"]),
-        "at the limit": ", ".join(patches[patches["gap_after_mm"] > NEAR * record["limit_mm"]]["patch"]),
+        "shims per joint": ", ".join(f"{n} in {counted(per_joint[n], 'joint')}" for n in sorted(per_joint)),
+        "at the limit": ", ".join(at_limit),
         "liquid shim": f"{significant(patches['liquid_mm3'].sum())} mm³ fill what is left in all patches",
         "how sure": ". ".join(record["sure"]),
+        **{f"largest {key}": _largest(record, key, shims) for key in LIMITS},
     }
-    for key, name in LIMITS.items():
-        if (allowed := record.get("limit_mm" if key == "gap" else f"allow_{key}")) is not None:
-            figures = f"{significant(before[key])} without, {significant(after[key])} with shims"
-            facts[name] = f"{figures}; {allowed:g} allowed"
-    ranges = [Column(f"{axis}, mm", partial(_range, axis)) for axis in "xy"]
-    columns = [word("patch", "patch"), *ranges, *(number(name, key) for name, key in COLUMNS.items())]
-    caption = "*The shims*: thickness, and borders in mm; rings are fasteners and other marks of the scene."
-    names = {"x, mm": "x", "y, mm": "y", "without, N": "force_N", "with shims, N": "with_shims_N"}
-    of_forces = [word("kind", "kind"), *(number(name, key) for name, key in names.items())]
-    with style.applied():
-        blocks: list[Block] = [
-            facts_table("", "*The question and its answer.*", facts),
-            Figure("shims", caption, _drawing(record, shims)),
-            Table("shims", "*All patches*; one without a thickness has no shim.", patches, columns),
-            Table("forces", "*Forces in fasteners* of the scene as its file has it.", forces, of_forces),
-        ]
-    return written(directory / "report.md", f"Shims: {record['title']}", [Section("The shims", blocks)])
+
+
+def _largest(record: dict[str, Any], key: str, shims: int) -> str:
+    """The largest gap, force or stress without and with so many shims, if it has a limit."""
+    unit, name = LIMITS[key]
+    if record[name] is None:
+        return ""
+    before, after = (f"{significant(record[when][key])} {unit}" for when in ("before", "after"))
+    chose, fresh = (" in the cases that chose", " in the fresh cases") if record["samples"] else ("", "")
+    at = f", at {record['worst_at']}" if key == "gap" else ""
+    both = f"{before}{chose}, {after}{fresh}" if fresh else after
+    both = f"{before} without shims{chose}, {after} with them{fresh}" if shims else both
+    return f"{both}{at}; {record[name]:g} {unit} allowed"
+
+
+def _stock(pieces: pd.DataFrame) -> list[Block]:
+    """What to order: how many pieces of each thickness all joints take. pieces : one line each."""
+    columns = {"pieces": ("joint", "size"), "joints": ("joint", "nunique"), "area_mm2": ("area_mm2", "sum")}
+    table = pieces.groupby("thickness_mm").agg(**columns).reset_index()
+    drawing = style.figure(2.6)
+    axes = drawing.subplots()
+    axes.bar(table["thickness_mm"].map("{:g}".format), table["pieces"], color=style.BLUE)
+    axes.set(xlabel="thickness, mm", ylabel="pieces")
+    shown = [number("thickness, mm", "thickness_mm"), number("pieces", "pieces", whole)]
+    shown += [number("joints", "joints", whole), number("area, mm²", "area_mm2")]
+    caption = "*What to order*: the pieces of each thickness that all joints take."
+    return [Figure("stock", "*Pieces of each thickness.*", drawing), Table("stock", caption, table, shown)]
+
+
+def _on_page(table: Table) -> Data:
+    _, title, summary = table.caption.split("*", 2)
+    lines = [[plain(column.show(line)) for column in table.columns] for line in records(table.data)]
+    heads = [column.heading for column in table.columns]
+    return {"title": title.rstrip("."), "summary": summary.strip("; "), "heads": heads, "lines": lines}
 
 
 def _range(axis: str, line: Mapping[str, Any]) -> str:
     return f"{line[f'{axis}_min']:.6g} … {line[f'{axis}_max']:.6g}"
 
 
-def _drawing(record: dict[str, Any], shims: pd.DataFrame) -> Drawing:
-    """The junction with each shim, its name and thickness; borders of shims are the ticks of the axes."""
+def _drawing(record: dict[str, Any], shims: pd.DataFrame, label: str) -> Drawing:
+    """The junction with each shim, its name and what `label` has of it; the ticks are borders of shims."""
     (west, south), (east, north) = record["bounds"]
     drawing = style.figure(min(max(style.WIDTH * (north - south) / (east - west), 2.2), style.WIDTH))
     axes = drawing.subplots()
     axes.add_patch(Rectangle((west, south), east - west, north - south, fill=False))
-    for line in shims.to_dict("records"):
-        low = np.array([line["x_min"], line["y_min"]])
-        width, height = np.array([line["x_max"], line["y_max"]]) - low
-        axes.add_patch(Rectangle(tuple(low), width, height, facecolor=style.SKY, edgecolor=style.BLUE))
+    corners = [np.array(outline) for outline in shims["outline"]]
+    for outline, (_, line) in zip(corners, shims.iterrows(), strict=True):
+        axes.add_patch(Polygon(outline, facecolor=style.SKY, edgecolor=style.BLUE))
+        middle, (width, height) = outline.mean(axis=0), np.ptp(outline, axis=0)
         look: dict[str, Any] = {"ha": "center", "va": "center", "rotation": 90 if width < height else 0}
-        axes.text(
-            low[0] + width / 2, low[1] + height / 2, f"{line['patch']}: {line['thickness_mm']:g}", **look
-        )
+        axes.text(middle[0], middle[1], f"{line['patch']}: {line[label]:g}", **look)
     axes.plot(*np.reshape(record["marks"], (-1, 2)).T, "o", color=style.BLACK, fillstyle="none", ms=4)
-    axes.set_xticks(sorted({west, east, *shims["x_min"], *shims["x_max"]}))
-    axes.set_yticks(sorted({south, north, *shims["y_min"], *shims["y_max"]}))
+    ends = np.concatenate([record["bounds"], *corners]).T
+    for axis, places in zip((axes.xaxis, axes.yaxis), ends, strict=True):
+        axis.set_ticks(ticks := sorted(set(places)), [f"{tick:.6g}" for tick in ticks])
     axes.tick_params(axis="x", rotation=90)
     axes.set(
         xlabel="x, mm", ylabel="y, mm", aspect="equal" if (north - south) / (east - west) > 0.2 else "auto"

@@ -2,27 +2,37 @@
 
 import json
 from dataclasses import replace
+from hashlib import sha256
 from itertools import product
 from math import inf
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from commands import harness
-from small_joints import FASTENERS, GAP, two_parts
+from scipy.stats import beta
+from small_joints import FASTENERS, GAP, two_parts, with_gap
 
 from harness import solve
 from harness.placement.answer_journal import AnswerJournal
-from harness.placement.session import PlanSession, Question
+from harness.placement.fresh_cases import Goal
+from harness.placement.session import Outcome, PlanSession, Question
 from harness.scene.fastener_forces import fastener_forces
+from harness.series.load_case_source import GapCases
+from harness.shimming.each import each_joint
+from harness.shimming.gap_regions import patches_of_gap
 from harness.shimming.patches import patches_of, stock_of
 from harness.shimming.search import ShimSearch, ShimStudy
 from problems.build import load_case
 from problems.effects.shims import Shims
 from problems.errors import InputError
 from problems.load_cases import Listed
+from problems.load_cases.measured_gaps import MeasuredGaps
+from problems.model.scene import JointScene
+from problems.reporter import SILENT
 from problems.scene_files import read_scene
 
 RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
@@ -124,6 +134,112 @@ def test_each_contact_is_in_one_patch(tmp_path: Path) -> None:
     assert len(patches_of(joint, None)) == 16
 
 
+def test_outlines_are_cut_to_any_shape(strip: Path, tmp_path: Path) -> None:
+    """An L and the rest of a rectangle, whichever way round: the gap of two rectangles, each contact once."""
+    joint, csv = read_scene(str(strip)).joint, tmp_path / "outlines.csv"  # type: ignore[attr-defined]
+    inner = [("L", 0, 0), ("L", 120, 0), ("L", 120, 25), ("L", 60, 25), ("L", 60, 50), ("L", 0, 50)]
+    rest = [("rest", 60, 50), ("rest", 60, 25), ("rest", 120, 25), ("rest", 120, 50)]
+    csv.write_text("name,x,y\n" + "".join(f"{name},{x},{y}\n" for name, x, y in inner + rest))
+    ell, other = patches_of(joint, str(csv))
+    two = [
+        Shims(kind="shims", thickness=1.0, x=x, y=y) for x, y in (((0, 60), (0, 50)), ((60.1, 120), (0, 25)))
+    ]
+    np.testing.assert_array_equal(ell.shim.gap(joint), two[0].gap(joint) + two[1].gap(joint))
+    both = ell.shim.gap(joint) + other.shim.gap(joint)
+    x, _ = joint.places(joint.pairs[0]).T
+    np.testing.assert_array_equal(both, np.where(x <= 120, -1.0, 0.0))
+    assert (ell.area, other.area) == (60 * 50 + 60 * 25, 60 * 25)
+    csv.write_text("name,x,y\none,0,0\none,9,9\ntwo,0,0\ntwo,50,0\ntwo,900,50\n")
+    with pytest.raises(InputError, match=r"(?s)3 corners or more.*900.*on the junction"):
+        patches_of(joint, str(csv))
+
+
+def test_patches_of_a_gap_need_shims_that_change_nothing_else(strip: Path) -> None:
+    """In each a thickness t, max y − limit ≤ t ≤ min y: displacements stay, and the limit is kept."""
+    answer = solve(str(strip))
+    scene, joint, limit = answer.scene, answer.scene.joint, 0.4 * answer.gap.max()  # type: ignore[attr-defined]
+    patches = patches_of_gap(joint, answer.gap, limit)
+    inside = np.array([patch.shim.gap(joint) < 0 for patch in patches])
+    assert 1 < len(patches) <= 16
+    assert inside.sum(axis=0).max() == 1
+    assert inside.any(axis=0)[answer.gap > limit].all()
+    least = [answer.gap[some].min() for some in inside]
+    assert all(np.ptp(answer.gap[some]) <= limit for some in inside)
+    shims = [p.shim.model_copy(update={"thickness": t}) for p, t in zip(patches, least, strict=True) if t > 0]
+    shimmed = solve(replace(scene, effects=(*scene.effects, *shims)))  # type: ignore[attr-defined]
+    np.testing.assert_allclose(shimmed.x, answer.x, atol=1e-8)
+    assert shimmed.gap.max() <= limit + 1e-8
+    assert patches_of_gap(joint, answer.gap, answer.gap.max()) == ()
+
+
+def test_each_joint_has_shims_of_its_own(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `solve` says of each of them with its shims; the same after an interruption; the stock adds up."""
+    words, keep, kept = ("--each", "--cases", 5, "--share", 1, "--mean", 0.08), AnswerJournal._keep, [0]
+
+    def interrupted(self: AnswerJournal, *answer: Any) -> None:
+        keep(self, *answer)
+        kept[0] += 1
+        if kept[0] == 2:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("report.writers.shim_report.write", Path)  # slow
+        patch.setattr(AnswerJournal, "_keep", interrupted)
+        assert shim(strip, tmp_path / "parts", *words).exit_code == 130
+        patch.setattr(AnswerJournal, "_keep", keep)
+        assert shim(strip, tmp_path / "parts", *words).exit_code in (0, 4)
+    done = shim(strip, tmp_path / "whole", *words)
+    assert "of 5 joints can be kept within the limits" in done.output
+    record = record_of(tmp_path / "whole")
+    assert record["joints"] == record_of(tmp_path / "parts")["joints"]
+    scene = read_scene(str(strip))
+    assert isinstance(scene, JointScene)
+    study = session_of(strip, "4x1").study
+    cases, pieces = GapCases(count=5, mean=0.08).of(scene, "dual"), 0
+    for joint, line in zip(
+        record["joints"], pd.read_csv(tmp_path / "whole" / "joints.csv").iloc, strict=True
+    ):
+        effects = [effect for effect in scene.effects if effect.kind != "initial_gap"]
+        effects += [study.effect(item) for item in joint["plan"]]
+        load = cases.load(joint["joint"])
+        gap = solve(with_gap(replace(scene, effects=tuple(effects)), load.g)).gap.max()
+        assert (gap <= 0.08) == joint["kept"] == line["kept"]
+        pieces += len(joint["plan"])
+    stock = pd.read_csv(tmp_path / "whole" / "stock.csv")
+    assert stock["pieces"].sum() == pieces > 0
+    assert set(stock["thickness_mm"]) <= set(STOCK)
+
+
+@pytest.mark.parametrize(
+    ("failing", "share"), [(0, 0.95), (1, 0.95), (4, 0.95), (5, 0.95), (9, 0.9), (1, 1.0)]
+)
+def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, share: float) -> None:
+    """By another implementation of the interval; of a table of joints the share itself counts."""
+    limit, count = 0.1, 200
+    bare = load_case(read_scene("examples/small-joint.toml"))
+    gaps = MeasuredGaps(bare, np.zeros((count, len(bare.g))), count)
+
+    def journal(questions: list[Question]) -> list[list[Outcome]]:
+        gaps = [0.05 if q.cases[0] >= failing else 0.2 for q in questions]
+        return [[Outcome((gap,), (0,), (gap,), ((gap,),), ())] * 2 for gap in gaps]
+
+    for cases in (Listed((bare,) * count), gaps):
+        study: Any = SimpleNamespace(cases=cases)
+        *_, words, passed = each_joint(journal, study, Goal(limit, share), STOCK, SILENT)  # type: ignore[arg-type]
+        low, _ = proportion(count - failing, count)
+        needed = 1 - failing / count if cases is gaps or share == 1 else low
+        assert passed == (needed >= share)
+        assert f"interval {100 * low:.1f} to " in words
+
+
+def proportion(kept: int, count: int) -> tuple[float, float]:
+    """The interval of Clopper and Pearson by quantiles of beta distributions."""
+    low = float(beta.ppf(0.025, kept, count - kept + 1))
+    return low, 1.0 if kept == count else float(beta.ppf(0.975, kept + 1, count - kept))
+
+
 def test_stocks_are_lists_or_steps() -> None:
     assert stock_of("0.2,0.3,0.5") == (0.2, 0.3, 0.5)
     assert stock_of("0.05:0.2:0.05") == (0.05, 0.1, 0.15, 0.2)
@@ -152,12 +268,17 @@ def test_the_command_finds_shims_that_solve_confirms(strip: Path, tmp_path: Path
     assert record["after"]["gap"] <= 0.08 < record["before"]["gap"]
     assert (table["gap_after_mm"] <= 0.08).all()
     effects = read_scene(str(tmp_path / "out" / "shimmed.toml")).effects  # type: ignore[attr-defined]
-    cut = [(effect.x[1], effect.thickness) for effect in effects if effect.kind == "shims"]
+    cut = [(effect.outline[1][0], effect.thickness) for effect in effects if effect.kind == "shims"]
     assert cut == [
         tuple(line) for line in table.query("thickness_mm > 0")[["x_max", "thickness_mm"]].to_numpy()
     ]
-    for name in ("report.md", "shims.png", "forces.csv"):
+    for name in ("report.md", "shims.png", "forces.csv", "sheet.pdf"):
         assert (tmp_path / "out" / name).is_file()
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert record["said"] in page
+    assert "data:image/png;base64," in page
+    assert record["inputs"]["strip.toml"] == sha256(strip.read_bytes()).hexdigest()
+    assert record["scene_key"] == read_scene(str(strip)).key
     # The same command again finds all answers; another search is refused.
     answers = (tmp_path / "out" / "shims.jsonl").read_text()
     assert shim(strip, tmp_path / "out", "--cases", 2, "--share", 1).exit_code == 0

@@ -2,18 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 from commands import harness
-from small_joints import STAGED
+from small_joints import STAGED, with_gap
 
 from harness.results import series_file
 from harness.scene.solution import solve
 from harness.series.load_case_source import GapCases
 from harness.series.staged import last_scene
-from problems.effects.measured_gap import MeasuredGap
 from problems.forms import Form
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
@@ -25,14 +22,6 @@ COUNT = 3
 def scene(tmp_path: Path) -> Path:
     (tmp_path / "scene.toml").write_text(STAGED, "utf-8")
     return tmp_path / "scene.toml"
-
-
-def with_gap(scene: JointScene, gap: Any) -> JointScene:
-    """The scene with these gaps at its contacts, (m,) mm, in place of the random ones."""
-    places = np.concatenate([scene.joint.places(pair) for pair in scene.joint.pairs])
-    measured = MeasuredGap(kind="measured_gap", points=tuple(map(tuple, np.column_stack([places, gap]))))
-    rest = (effect for effect in scene.effects if effect.kind != "initial_gap")
-    return replace(scene, effects=(*rest, measured))
 
 
 @pytest.mark.parametrize(("form", "solver"), [("dual", "newton"), ("sparse", "newton"), ("primal", "piqp")])

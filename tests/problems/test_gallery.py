@@ -113,6 +113,18 @@ def test_riveted(name: str, largest: float) -> None:
     assert answer.gap.max() == pytest.approx(largest, rel=2e-3)
 
 
+def test_shimmed_strip() -> None:
+    """Built in at both ends, moved by d = 1 − 0.6 mm in the middle: 192 EI d/L³ of the clamps' 80 N bend it,
+    the shim bears the rest; at the quarters it moves by d/2.
+    """
+    answer = solve("gallery/shimmed-strip")
+    bending = 192 * 70e3 * 60.0 * 4.0**3 / 12 * 0.4 / 400.0**3
+    assert answer.lam.sum() == pytest.approx(80.0 - bending, rel=2e-3)
+    gap = answer.gap.reshape(21, 3)
+    np.testing.assert_allclose(gap[[0, -1]], 1.0 - 0.2, rtol=1e-3)
+    assert abs(gap[10]).max() < 1e-9
+
+
 def test_shifted_support() -> None:
     """Pure twist w = c x y: each corner bears 2 D (1 − ν) c, and c a b = shift − 4 R/k."""
     _, x, lam = solved("shifted-support")

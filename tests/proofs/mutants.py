@@ -246,6 +246,22 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "s >= round(t + excess, DIGITS)": ("True",),
         "if s > t and": ("if",),
     },
+    "harness/shimming/gap_regions.py": {
+        "<= limit_mm:\n                break": ("<= 3 * limit_mm:\n                break",),
+        "among[over[among]]": ("among",),
+        "2 * first - low": ("low",),
+    },
+    "harness/shimming/each.py": {
+        "count - kept <= most": ("True", "count - kept < most"),
+        "search.among(self.cases, 0)": ("search.among((0,), 0)",),
+    },
+    "problems/effects/shims.py": {
+        "(cross(edge, at[:, None] - corners) > 0) == (edge[:, 1] > 0)": (
+            "cross(edge, at[:, None] - corners) > 0",
+        ),
+        "low + NUDGE, high - NUDGE": ("low - 1.0, high + 1.0",),
+        "places - NUDGE": ("places",),
+    },
     "harness/placement/search.py": {
         "set(nearest(step.plan, place, NEXT))": ("set()",),
         "for plan in self.even(len(step.plan) - 1)}": ("for plan in []}",),
@@ -349,6 +365,9 @@ TESTS = {
     "harness/placement/session.py": ("harness/test_place.py", "harness/test_staged_place.py"),
     "harness/placement/plan_search.py": ("harness/test_search.py", "harness/test_place.py"),
     "harness/shimming/search.py": ("harness/test_shim.py",),
+    "harness/shimming/gap_regions.py": ("harness/test_shim.py",),
+    "harness/shimming/each.py": ("harness/test_shim.py",),
+    "problems/effects/shims.py": ("harness/test_shim.py",),
     "harness/placement/search.py": ("harness/test_search.py", "harness/test_place.py"),
     "harness/placement/fresh_cases.py": ("harness/test_place.py",),
     "problems/input/matrix_entries.py": ("problems/test_entries.py", "problems/test_formats.py"),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import harness
 from matplotlib.image import imread
 from rich.console import Console
 from typer.main import get_command
@@ -173,6 +174,21 @@ def test_commands_of_a_page_exist_with_their_options(page: Path) -> None:
         if page.name != "CHANGELOG.md":
             known = {option for param in COMMANDS[name].params for option in param.opts}
             assert {word for word in words if word.startswith("--")} <= known, call
+
+
+def test_the_tutorial_of_shims_says_what_its_commands_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the scan to the drawing, in an empty folder beside the examples; the reports are left out."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.setattr("report.writers.answer_report.write", Path)
+    monkeypatch.setattr("report.writers.shim_report.write", Path)
+    monkeypatch.chdir(tmp_path)
+    page = (DOCS / "shims.md").read_text("utf-8").replace("\\\n", "")
+    steps = re.findall(r"```sh\npython -m harness (.*)\n```\n\n```text\n(.*)\n```", page)
+    assert len(steps) >= 4
+    for command, said in steps:
+        assert said in " ".join(harness(*command.split()).output.split())
 
 
 def test_the_main_suite_takes_as_long_on_every_page() -> None:
