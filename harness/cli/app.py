@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Callable
 from io import TextIOWrapper
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -17,7 +18,7 @@ from harness.terminal.docstrings import docstring
 from .compare import compare
 from .exchange import export, import_, judge
 from .explore import explore
-from .options import MemoryLimit, Plugin, error_reporting, option
+from .options import NOTHING_WRITTEN, MemoryLimit, Plugin, error_reporting, option
 from .place import place
 from .scene import init, solve, validate
 from .series import series
@@ -98,9 +99,30 @@ def list_(what: Literal["solvers", "scenes", "suites", "formats"]) -> None:
         console.print(listing(what))
 
 
+def schema(
+    what: Literal["scene", "suite", "row"],
+    out: Annotated[Path | None, option("FILE", "Write it there.  [default: print it]")] = None,
+) -> None:
+    """Write the JSON schema of a scene, of a suite, or of a row of measurements.jsonl, for an editor.
+
+    \b
+    Example:
+      python -m harness schema scene --out scene.schema.json
+    """
+    with error_reporting(*NOTHING_WRITTEN):
+        from harness.planning.json_schema import schema_of
+        from harness.results.records import replace_text, to_line
+
+        text = to_line(schema_of(what)) + "\n"
+        if out is None:
+            typer.echo(text, nl=False)
+        else:
+            replace_text(out, text)
+
+
 app.callback(help=docstring(harness))(harness)
 ONE_SCENE: list[Callable[..., None]] = [init, validate, solve, series, tolerance, place, shim, explore]
-OTHERS: list[Callable[..., None]] = [run, report, gate, compare, check, list_, export, import_, judge]
+OTHERS: list[Callable[..., None]] = [run, report, gate, compare, check, list_, schema, export, import_, judge]
 for command in ONE_SCENE + OTHERS:
     app.command(command.__name__.strip("_"), help=docstring(command))(command)
 

@@ -145,6 +145,13 @@ def _unit(model: type[BaseModel], path: Sequence[object]) -> str | None:
     return None
 
 
+def with_units(schema: dict[str, Any], model: type[BaseModel]) -> None:
+    """Describe each key in the JSON schema of a table by its unit."""
+    for name in model.model_fields:
+        if unit := _unit(model, [name]):
+            schema["properties"][name]["description"] = unit
+
+
 def _model_in(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation

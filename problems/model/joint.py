@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded_types import Name, Positive
+from problems.input.bounded_types import Name, Positive, with_units
 
 from .plate import Plate
 from .surface import Grid
@@ -38,7 +38,7 @@ Faults = Iterator[tuple[str, object, str]]
 class Table(BaseModel):
     """A table of a TOML file; unknown keys in it are errors."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=with_units)
 
 
 class Junction(Table):
