@@ -1,5 +1,6 @@
 """The commands for a suite: run, report, gate."""
 
+import os
 import signal
 from pathlib import Path
 from typing import Annotated, Any
@@ -134,6 +135,10 @@ def gate(
         Path | None, option("DIR", "An earlier run, whose errors must not be exceeded by the margin.")
     ] = None,
     margin: Annotated[float, option("FACTOR", "The allowed factor over the baseline.", min=1.0)] = 10.0,
+    max_slowdown: Annotated[
+        float | None,
+        option("FACTOR", "The allowed ratio of times to the baseline, beside other solvers.", min=1.0),
+    ] = None,
     json: Annotated[Path | None, option("FILE", "Write the findings as JSON.")] = None,
     junit: Annotated[Path | None, option("FILE", "Write the findings as JUnit XML.")] = None,
 ) -> None:
@@ -143,30 +148,39 @@ def gate(
     baseline, an error that is still within the limit fails if it is more than the margin times what it was;
     what lies below the reference's error bound does not count.
 
+    --max-slowdown compares a solver's times with those of the other solvers on the scene in the same run, and
+    this ratio with the baseline's, which may be of another machine. It takes three repeats of both.
+
+    In a job of GitHub's, the outcome is appended to the page of the job ($GITHUB_STEP_SUMMARY).
+
     \b
     Examples:
       python -m harness run gate && python -m harness gate results/gate
       python -m harness gate results/gate --baseline baseline --margin 10 --junit gate.xml
+      python -m harness gate results/gate --baseline baseline --max-slowdown 1.5
 
     \b
     Exit codes:
       0  every gated row is within 1e-7 mm (on a rung of a ladder, within what conditioning allows)
       1  accuracy lost: a gated row is outside, cannot be judged, has no answer, was never measured, or is
-         worse than the baseline
+         worse or slower than the baseline
       2  wrong usage or bad input
       3  nothing could be judged
       5  the baseline has none of these measurements, other problems or other limits
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
+        from harness.verification.gate import append_summary, show
         from harness.verification.gate import gate as judge_again
-        from harness.verification.gate import show
 
         outcome = judge_again(
             directory,
             reference_limit_s=reference_limit,
             baseline=baseline,
             margin=margin,
+            max_slowdown=max_slowdown,
             json_file=json,
             junit_file=junit,
         )
+        if page := os.environ.get("GITHUB_STEP_SUMMARY"):
+            append_summary(Path(page), outcome)
         raise typer.Exit(show(outcome, console))

@@ -12,7 +12,7 @@ baseline are read from its rows; its answers need not have been kept.
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
@@ -22,6 +22,7 @@ from harness.results.records import Row, replace_text, to_line
 from harness.terminal.console import legible
 
 from .judge import Judgement
+from .slowdown import slowdowns
 
 SUITE = "rivetbench gate"
 JUDGED = ("verdict", "displacement_error_mm", "reference_bound_mm")  # of a finding, in JSON
@@ -30,13 +31,16 @@ MARGIN = 10.0  # by which an error may exceed the baseline's
 
 @dataclass(frozen=True)
 class Finding:
-    """One gated measurement, judged again. why : the reason if it failed. baseline_mm : its error there."""
+    """One gated measurement, judged again. why : the reason if it failed. baseline_mm : its error there.
+    slowdown : S of slowdown.py if that is why.
+    """
 
     key: str
     judgement: Judgement
     limit_mm: float
     why: str = ""
     baseline_mm: float | None = None
+    slowdown: float | None = None
 
     @property
     def passed(self) -> bool:
@@ -51,15 +55,16 @@ class Finding:
 class Baseline:
     """The largest error of each measurement within its limit, mm, and the error bound of its reference.
 
-    name : of its directory. margin : the allowed factor.
+    name : of its directory. margin : the allowed factor. slower : see `slowdowns`.
     """
 
     name: str
     margin: float
     errors: Mapping[str, tuple[float, float]]
+    slower: Mapping[str, float] = field(default_factory=dict)
 
     def compared(self, row: Row, finding: Finding) -> Finding:
-        """The finding of a row with its error in the baseline, failed if it is beyond the margin.
+        """The finding of a row with its error in the baseline, failed if it is beyond the margin, or slower.
 
         Unchanged if the baseline has no error of this measurement within the limit.
         """
@@ -71,23 +76,28 @@ class Baseline:
         if judged.verdict != "within" or error_mm is None:
             return finding
         if error_mm <= self.margin * max(then_mm, floor_mm(max(bound_mm, then_bound_mm), finding.limit_mm)):
-            return finding
+            slowdown = self.slower.get(measurement(row))
+            why = f"{slowdown:.2f} times the baseline's time, beside other solvers" if slowdown else ""
+            return replace(finding, why=why, slowdown=slowdown)
         return replace(finding, why=f"more than {self.margin:g} times the baseline's {then_mm:.1e} mm")
 
 
-def read_baseline(directory: Path, margin: float, name: str, rows: Iterable[Row]) -> Baseline:
+def read_baseline(
+    directory: Path, margin: float, name: str, rows: Iterable[Row], max_slowdown: float | None = None
+) -> Baseline:
     """The baseline for the rows of the directory `name`. Raises InputError; Incomparable if it has none of
     these measurements.
     """
     side = read_side(str(directory))
     refuse_incomparable(side, Side(name, list(rows)))
+    slower = slowdowns(side, read_side(name), max_slowdown) if max_slowdown else {}
     errors: dict[str, tuple[float, float]] = {}
     for row in side.rows:
         error, bound = row.get("displacement_error_mm"), row.get("reference_bound_mm") or 0.0
         if row["verdict"] == "within" and error is not None and isfinite(error + bound):
             key = measurement(row)
             errors[key] = max(errors.get(key, (0.0, 0.0))[0], error), bound
-    return Baseline(str(directory), margin, errors)
+    return Baseline(str(directory), margin, errors, slower)
 
 
 def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: int) -> None:
@@ -103,6 +113,7 @@ def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: i
                 **{name: getattr(finding.judgement, name) for name in JUDGED},
                 "limit_mm": finding.limit_mm,
                 "baseline_mm": finding.baseline_mm,
+                "slowdown": finding.slowdown,
                 "why": finding.why,
             }
             for finding in findings

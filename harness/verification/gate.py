@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import pandas as pd
 from pydantic import Field, create_model
 from rich.console import Console
 from rich.table import Table
@@ -25,6 +26,7 @@ from harness.terminal.console import STYLES
 from problems.errors import InputError
 from problems.forms import form_family
 from problems.input.bounded_types import Positive
+from report.document.escape import markdown, quoted
 from report.document.numbers import counted, out_of
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
@@ -40,6 +42,7 @@ GATED = create_model(
     case=(Annotated[int, Field(ge=0, lt=10**9)] | None, None),
     series=(RandomCases | None, None),
 )
+HEADINGS = ["measurement", "error mm", "limit mm", "verdict", "why"]
 UNREADABLE = "is missing, damaged or not finite"
 
 #: The files of a run that no output may replace.
@@ -76,6 +79,7 @@ def gate(
     reference_limit_s: float | None = None,
     baseline: str | Path | None = None,
     margin: float = MARGIN,
+    max_slowdown: float | None = None,
     json_file: str | Path | None = None,
     junit_file: str | Path | None = None,
 ) -> GateOutcome:
@@ -91,6 +95,8 @@ def gate(
         The directory of an earlier run, whose errors may be exceeded by the margin at most.
     margin : float, optional
         The allowed factor over the baseline.
+    max_slowdown : float, optional
+        The allowed factor over the baseline's seconds, beside the other solvers of each run.
     json_file, junit_file : str or Path, optional
         Files for the findings: JSON, and JUnit XML.
 
@@ -103,7 +109,7 @@ def gate(
     Raises
     ------
     InputError
-        If the directory has no rows, or damaged ones.
+        If the directory has no rows, or damaged ones; if no slowdown can be told.
     Incomparable
         If the baseline is of another suite.
 
@@ -120,12 +126,14 @@ def gate(
         raise InputError.one("DIR", "directory", str(folder), "no such directory; `run` makes one")
     sides = [folder] if base is None else [folder, base]
     inputs = [path for side in sides for files in MEASURED for path in side.glob(files)]
+    if max_slowdown is not None and base is None:
+        raise InputError.one("--max-slowdown", "factor", max_slowdown, "needs --baseline DIR")
     named = {"--json": json_file, "--junit": junit_file}
     outputs = {option: Path(file) if file else None for option, file in named.items()}
     refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])
     rows = gated_rows(folder / records.MEASUREMENTS)
     refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
-    standard = read_baseline(base, margin, str(folder), rows.values()) if base else None
+    standard = read_baseline(base, margin, str(folder), rows.values(), max_slowdown) if base else None
     findings = [*judged(rows, folder, reference_limit_s, standard), *never_measured(rows, folder)]
     code, sentences = concluded(findings, standard)
     if json_file:
@@ -140,9 +148,11 @@ def concluded(findings: list[Finding], baseline: Baseline | None) -> tuple[int, 
     verdicts = [finding.judgement.verdict for finding in findings]
     if not {"within", "outside"} & set(verdicts):
         return NOTHING_JUDGED, ("Nothing could be judged: no gated row has an answer that can be.",)
-    failed = sum(not finding.passed for finding in findings)
-    if failed:
-        return FAILED, (f"Accuracy lost: {out_of(failed, len(findings), 'gated row')}.",)
+    slower = sum(finding.slowdown is not None for finding in findings)
+    worse = {"Accuracy lost": sum(not finding.passed for finding in findings) - slower, "Slower": slower}
+    if any(worse.values()):
+        told = (f"{what}: {out_of(k, len(findings), 'gated row')}." for what, k in worse.items() if k)
+        return FAILED, tuple(told)
     compared = sum(finding.baseline_mm is not None for finding in findings)
     if baseline and not compared:
         why = f"no gated row has an error within its limit in {baseline.name}"
@@ -231,12 +241,24 @@ def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
 
 
 def table(findings: list[Finding]) -> Table:
-    headings = "measurement", "error mm", "limit mm", "verdict", "why"
-    made = Table(*headings, title="Gate: the answers judged again")
+    made = Table(*HEADINGS, title="Gate: the answers judged again")
     for finding in findings:
-        error, verdict = finding.judgement.displacement_error_mm, finding.judgement.verdict
-        shown = "–" if error is None else f"{error:.1e}"
-        limit = f"{finding.limit_mm:.0e}"
+        verdict = finding.judgement.verdict
         style = STYLES[verdict if finding.passed or verdict != "within" else "outside"]
-        made.add_row(finding.key, shown, limit, verdict, finding.why, style=style)
+        made.add_row(*_cells(finding), style=style)
     return made
+
+
+def _cells(finding: Finding) -> tuple[str, ...]:
+    error = finding.judgement.displacement_error_mm
+    shown = "–" if error is None else f"{error:.1e}"
+    return finding.key, shown, f"{finding.limit_mm:.0e}", finding.judgement.verdict, finding.why
+
+
+def append_summary(path: Path, outcome: GateOutcome) -> None:
+    """Append the outcome to the Markdown of a CI job's page: sentences, then a table, what failed first."""
+    findings = sorted(outcome.findings, key=lambda finding: finding.passed)
+    cells = quoted([[*_cells(finding)] for finding in findings])
+    told = pd.DataFrame(cells, columns=HEADINGS).to_markdown(index=False, disable_numparse=True)
+    with path.open("a", encoding="utf-8") as page:
+        page.write(markdown(f"## The accuracy gate\n\n{' '.join(outcome.sentences)}\n\n{told}\n\n"))

@@ -9,12 +9,15 @@ from xml.etree import ElementTree
 import pytest
 from commands import harness
 from suite_runs import changed, moved, rows_of
+from synthetic_results import row
 from typer.testing import Result
 
 from harness.results import records
-from harness.results.comparison import measurement
+from harness.results.comparison import Side, measurement
+from harness.results.records import Row
 from harness.verification.findings import Baseline, Finding, read_baseline, write_junit
 from harness.verification.judge import Judgement
+from harness.verification.slowdown import slowdowns
 
 pytestmark = pytest.mark.slow
 
@@ -143,3 +146,78 @@ def test_the_findings_are_files_for_a_ci(finished: Path, copy: Path, tmp_path: P
     assert gate(finished, *files).exit_code == 0
     root = ElementTree.parse(tmp_path / "new" / "gate.xml").getroot()
     assert (root.get("failures"), root.get("errors")) == ("0", "0")
+
+
+def timed(first: Row, times: list[float], others: list[float]) -> list[Row]:
+    """A row in repeats of these seconds, and of another solver, which is not gated, on its scene."""
+    words = first["key"].replace("repeat=0", "repeat={}").replace("exact", "{}")
+    return [
+        first
+        | {"solver": solver, "gated": solver == "exact", "key": words.format(solver, k)}
+        | {"repeat": k, "setup_s": 0.0, "solve_s": t, "form_s": None}
+        for solver, seconds in {"exact": times, "other": others}.items()
+        for k, t in enumerate(seconds)
+    ]
+
+
+BEFORE = [1.0, 1.1, 1.2], [2.0, 2.1, 2.2]
+
+
+@pytest.mark.parametrize(
+    ("times", "others", "slowdown"),
+    [
+        (*BEFORE, None),
+        ([9.0, 9.9, 9.6], [20.0, 21.0, 22.0], None),  # another machine, ten times as slow
+        ([2.0, 2.2, 2.4], [2.0, 2.1, 2.2], 2.0),
+        ([0.2, 0.22, 0.24], [0.2, 0.21, 0.22], 2.0),  # a machine that is ten times as fast
+        ([1.15, 2.2, 2.4], [2.0, 2.1, 2.2], None),  # within the noise of its repeats
+        ([2.0, 2.2, 2.4], [2.0, 2.1, 8.0], None),  # within that of the other solver
+        ([1.5, 1.54, 1.6], [2.0, 2.1, 2.2], None),  # 1.4, and 1.5 is allowed
+    ],
+)
+def test_times_are_compared_beside_other_solvers(
+    times: list[float], others: list[float], slowdown: float | None
+) -> None:
+    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
+    old, new = Side("old", timed(first, *BEFORE)), Side("new", timed(first, times, others))
+    found = slowdowns(old, new, 1.5)
+    assert found == ({} if slowdown is None else {measurement(first): pytest.approx(slowdown)})
+
+
+def test_a_slower_solver_does_not_pass(copy: Path, tmp_path: Path) -> None:
+    """Although its answers are right, and the baseline is of another machine."""
+    old = Path(shutil.copytree(copy, tmp_path / "old"))
+    first = rows_of(copy)[0]
+    records.rewrite(copy / records.MEASUREMENTS, timed(first, [2.0, 2.2, 2.4], [2.0, 2.1, 2.2]))
+    records.rewrite(old / records.MEASUREMENTS, timed(first | {"machine": "another"}, *BEFORE))
+    suite = (copy / "suite.toml").read_text().replace("[1e-06, 1e-08]", "[1e-06]")
+    (copy / "suite.toml").write_text(suite.replace("repeats = 1", "repeats = 3"))
+    assert gate(copy, "--baseline", old).exit_code == 0
+    done = gate(copy, "--baseline", old, "--max-slowdown", 1.5, "--json", tmp_path / "gate.json")
+    assert done.exit_code == 1
+    assert "Slower: 3 of 3 gated rows." in done.stdout
+    assert "2.00 times the baseline's time" in done.stdout
+    assert json.loads((tmp_path / "gate.json").read_text())["measurements"][0]["slowdown"] == pytest.approx(2)
+
+
+def test_times_without_repeats_or_another_solver_tell_nothing(copy: Path, finished: Path) -> None:
+    for words in (["--baseline", finished], []):
+        done = gate(copy, *words, "--max-slowdown", 1.5)
+        assert done.exit_code == 2
+        assert ("in both runs: --repeat 3" if words else "needs --baseline DIR") in done.stderr
+
+
+def test_the_page_of_a_job_has_the_outcome(
+    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "summary.md"
+    page.write_text("# Before\n")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    moved(answers(copy)[1], 2e-7)
+    assert gate(copy).exit_code == 1
+    _, heading, _, sentence, _, headings, _, first, second, *_ = page.read_text().splitlines()
+    assert (heading, sentence) == ("## The accuracy gate", "Accuracy lost: 1 of 2 gated rows.")
+    assert [cell.strip() for cell in headings.split("|")[1:-1]][:2] == ["measurement", "error mm"]
+    assert "outside" in first
+    assert "within" in second
+    assert rows_of(copy)[0]["key"] in second

@@ -1,0 +1,37 @@
+"""Which measurements became slower beside the other solvers of their run: `gate --max-slowdown R`.
+
+Seconds of two machines cannot be compared, but what other solvers take on the same scene in the same run can.
+With t the median seconds per load case over the repeats, and t' that in the baseline,
+
+    S = (t / t') / F,    F the median of t / t' over the other solvers' measurements on the scene.
+
+A measurement is slower if S > R and, beyond the noise of the repeats in both runs,
+
+    min t / max t'  >  F⁺,    F⁺ the median of max t / min t' over the same others.
+
+Three repeats on each side are needed: all new ones are slower by chance once in 20 times. If all solvers on a
+scene become slower alike, nothing is reported.
+"""
+
+from math import inf
+
+from harness.results.comparison import Side, measurement
+from problems.errors import InputError
+from report.analysis.comparison import ENOUGH, compared
+from report.results.rows import frame
+
+
+def slowdowns(old: Side, new: Side, limit: float) -> dict[str, float]:
+    """S of each measurement that is slower, limit : R. Raises InputError if none can be told."""
+    frames = [frame([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)]
+    table = compared(frames[0], frames[1], True, inf, limit)
+    table = table[(table[["repeats_old", "repeats_new"]].min(axis=1) >= ENOUGH) & table["ratio"].notna()]
+    pairs = table.merge(table, on="scene_new", suffixes=("", "_other"))
+    pairs = pairs[pairs["solver_new"] != pairs["solver_new_other"]]
+    lines = pairs.groupby("measurement")[["ratio", "ratio_least", "ratio_other", "ratio_most_other"]].median()
+    if lines.empty:
+        allowed = f"{ENOUGH} repeats of two solvers on one scene, in both runs: --repeat {ENOUGH}"
+        raise InputError.one("--max-slowdown", "factor", limit, allowed)
+    S = lines["ratio"] / lines["ratio_other"]
+    slower = S[(limit < S) & (lines["ratio_least"] > lines["ratio_most_other"])]
+    return {str(name): float(each) for name, each in slower.items()}
