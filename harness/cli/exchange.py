@@ -22,8 +22,9 @@ def export(
 ) -> None:
     """Write a scene for another program: K, A, f, g in a file format, or the program of a form.
 
-    With --form: P, q, G, h (or the lower bounds lb) of min ½zᵀPz + qᵀz, Gz ≤ h, as one .npz or, for any other
-    PATH, a folder of Matrix Market files. Readers in Python, C++, Julia and Matlab: docs/exchange.md.
+    With --form: P, q, G, h (or the lower bounds lb) of min ½zᵀPz + qᵀz, Gz ≤ h, as .npz, .mps, .qps or, with
+    no suffix, a folder of Matrix Market files. Readers in Python, C++, Julia and Matlab: docs/exchange.md. Of
+    a suite: PATH.parquet, a test set of qpbenchmark.
 
     \b
     Examples:
@@ -31,6 +32,8 @@ def export(
       python -m harness export gallery/three-part-stack --format op4 --out stack.op4
       python -m harness export scaling/1170 --form dual --with-reference --out problem
       python -m harness export 4386/0107 --form primal --with-reference --out problem.npz
+      python -m harness export 4386/0107 --form dual --out problem.mps
+      python -m harness export gate --form dual --out gate.parquet
 
     \b
     Exit codes: 0 written, 2 wrong usage or bad input.

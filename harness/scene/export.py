@@ -8,21 +8,28 @@ A scene is written as K, A, f, g, or as a quadratic program with the accuracy to
 The arrays are P, q, and G, h or lb; with the reference also x (mm), lam (the multipliers of Gz ≤ h, N),
 bound_mm, the proven bound on max|x − x*|, and limit_mm, the largest error that an answer may have. They are
 written as a folder of Matrix Market files, one per array and with 17 digits, or as one .npz; about.json, or
-the texts in the .npz, name the problem.
+the texts in the .npz, name the problem. HiGHS writes P, q, G, h, lb as MPS, with 15 digits. The programs of a
+suite are a test set of qpbenchmark, a Parquet file.
 """
 
 import json
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import scipy.sparse as sp
+from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
+from harness.planning.suite import read_suite
 from harness.results.atomic_output import atomic_output, refuse_unwritable
+from harness.results.provenance import fingerprints
+from harness.results.records import replace_text
 from harness.terminal.console import console_of
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem, measurable, opened
@@ -42,6 +49,8 @@ from report.document.numbers import counted
 from .validate import digits_sentence, print_facts
 
 Arrays = dict[str, Any]
+#: The columns of a test set, https://github.com/qpsolvers/qpbenchmark; matrices are dense, row by row.
+TEST_SET = ("P", "q", "G", "h", "A", "b", "lb", "ub", "name")
 
 
 def export(
@@ -54,14 +63,14 @@ def export(
     reference_limit_s: float | None = None,
     reporter: Reporter = SILENT,
 ) -> Path:
-    """Write K, A, f, g of a scene in a file format, or its quadratic program in a form.
+    """Write K, A, f, g of a scene in a file format, or its quadratic program in a form, or those of a suite.
 
     Parameters
     ----------
     scene : str or Path
-        Name of a scene, or the path of its file.
+        Name of a scene, or the path of its file; of a suite, where `out` is a .parquet.
     out : str or Path
-        A file, or a folder for a format of several files.
+        A file, or a folder for a format of several files; with a form .npz, .mps, .qps or a folder.
     format : str, optional
         Format of K, A, f, g: npz, mtx, op4, …; none if `form` is given.
     form : str, optional
@@ -98,6 +107,10 @@ def export(
     if form is not None and format is not None:
         allowed = "none with --form: PATH.npz is one file, any other PATH a folder of .mtx"
         raise InputError.one("--format", "format", format, allowed)
+    if with_reference and out.suffix in (".mps", ".qps", ".parquet"):
+        raise InputError.one("--with-reference", "path", str(out), ".npz or a folder: it holds no answer")
+    if form is not None and out.suffix == ".parquet":
+        return _write_test_set(str(scene), out, form, console_of(reporter))
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     read = read_scene(str(scene))
     refuse_unwritable(out, read.sources)
@@ -110,7 +123,7 @@ def export(
     elif form is not None:
         arrays, about = _program(str(scene), read, form, with_reference, reference_limit_s)
         with atomic_output(out, read.sources) as new:
-            (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
+            WRITERS.get(out.suffix, _write_mtx)(new, arrays, about)
         content = f"{form} form, {len(arrays['q'])} unknowns, {counted(about['m'], 'contact')}"
     last = f"stage {read.stages[-1].name}, " if read.stages else ""
     console_of(reporter).print(f"{out}: {read.name}, {last}{content}.")
@@ -119,11 +132,11 @@ def export(
 
 def _refuse_suffix(out: Path, kind: formats.Format, program: bool) -> None:
     """Raise InputError for a folder named like a file, or a file named like one of another kind."""
-    folder = kind.is_folder or (program and out.suffix != ".npz")
+    folder = out.suffix not in WRITERS if program else kind.is_folder
     if folder and out.suffix[1:2].isalpha():
-        allowed = "no suffix: a folder is written" + (", or one file PATH.npz" if program else "")
+        allowed = "no suffix: a folder is written" + f", or one file {', '.join(WRITERS)}" * program
         raise InputError.one("--out", "path", str(out), allowed)
-    if not folder and out.suffix.lower() not in kind.suffixes:
+    if not (folder or program) and out.suffix.lower() not in kind.suffixes:
         raise InputError.one("--out", "path", str(out), f"must end in {' or '.join(kind.suffixes)}")
 
 
@@ -172,6 +185,45 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
         matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
         formats.matrix_text.write_one(path / f"{name}.mtx", matrix, "general")
     (path / "about.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")
+
+
+def _write_mps(path: Path, arrays: Arrays, about: Arrays) -> None:
+    import highspy
+
+    q, n = arrays["q"], len(arrays["q"])
+    P, G = sp.csc_array(sp.tril(arrays["P"])), sp.csc_array(arrays.get("G", (0, n)))
+    lb, h = arrays.get("lb", np.full(n, -np.inf)), arrays.get("h", np.zeros(0))
+    highs, kinds = highspy.Highs(), (1, 1, 1, 0.0)  # by columns, a triangle, a minimum, no constant
+    highs.silent()
+    highs.setOptionValue("small_matrix_value", 1e-12)  # HiGHS leaves smaller entries out; it takes no less
+    bounds = lb, np.full(n, np.inf), np.full(len(h), -np.inf), h
+    columns = (part for M in (G, P) for part in (M.indptr, M.indices, M.data))
+    highs.passModel(n, G.shape[0], G.nnz, P.nnz, *kinds, q, *bounds, *columns, np.zeros(n, dtype=np.int32))
+    highs.writeModel(str(path.with_suffix(".mps")))
+    path.with_suffix(".mps").replace(path)
+
+
+WRITERS = {".npz": _write_npz, ".mps": _write_mps, ".qps": _write_mps}
+
+
+def _write_test_set(suite: str, out: Path, form: Form, console: Console) -> Path:
+    """Write the programs of the suite's scenes, and beside them their SHA-256, as `sha256sum` does."""
+    if not find_spec("pyarrow"):
+        raise InputError.one("--out", "path", str(out), "needs pip install 'rivetbench[parquet]'")
+    refuse_unwritable(out)
+    rows: list[Arrays] = []
+    for scene in map(read_scene, read_suite(suite).scenes):
+        if not scene.refused:
+            arrays, _ = _program("", scene, form, False, None)
+            dense = (M.toarray() if sp.issparse(M) else M for M in arrays.values())
+            line = dict(zip(arrays, map(np.ravel, dense), strict=True))
+            rows.append(dict.fromkeys(TEST_SET) | line | {"name": scene.name})
+    with atomic_output(out) as new:
+        pd.DataFrame(rows).to_parquet(new, engine="pyarrow", index=False)
+    digits = fingerprints([out])[out.name]
+    replace_text(out.with_name(f"{out.name}.sha256"), f"{digits}  {out.name}\n")
+    console.print(f"{out}: {counted(len(rows), 'problem')}, {form} form, SHA-256 {digits}.")
+    return out
 
 
 def import_matrices(files: Sequence[str], out: str | Path, *, reporter: Reporter = SILENT) -> Path:

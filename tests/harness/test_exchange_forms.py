@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.sparse as sp
 import tiny_joint
@@ -14,6 +15,7 @@ from commands import harness
 from small_problems import solve_by_nnls
 from strip_scene import write_strip
 
+from harness import solve
 from problems.build import load_case, prepared
 from problems.forms import Form
 from problems.forms.problem import in_form
@@ -213,3 +215,88 @@ def test_what_is_no_answer_of_this_problem_is_refused(name: str, scenes: Path, t
     done = harness("judge", path, scenes / "tiny.npz")
     assert done.exit_code == code, done.output
     assert message in done.stderr
+
+
+def read_mps(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, float]]:
+    """P, q, G, h and the lower bounds of a free MPS file with QUADOBJ; z is free but for these."""
+    section, rows, columns = "", list[str](), dict[str, int]()
+    entries: dict[str, list[list[str]]] = {}
+    for line in path.read_text().splitlines():
+        if line[:1] not in (" ", "*", ""):
+            section = line.split()[0]
+        elif (words := line.split()) and line[0] == " ":
+            entries.setdefault(section, []).append(words)
+            if section == "COLUMNS":
+                columns.setdefault(words[0], len(columns))
+    rows = [name for kind, name in entries["ROWS"] if kind == "L"]
+    (objective,) = (name for kind, name in entries["ROWS"] if kind == "N")
+    q, G, P = np.zeros(len(columns)), np.zeros((len(rows), len(columns))), np.zeros((len(columns),) * 2)
+    for column, *pairs in entries["COLUMNS"]:
+        for row, value in zip(pairs[::2], pairs[1::2], strict=True):
+            (q if row == objective else G[rows.index(row)])[columns[column]] = float(value)
+    for a, b, value in entries["QUADOBJ"]:
+        P[columns[a], columns[b]] = P[columns[b], columns[a]] = float(value)
+    h = np.zeros(len(rows))
+    for _, *pairs in entries.get("RHS", []):
+        for row, value in zip(pairs[::2], pairs[1::2], strict=True):
+            h[rows.index(row)] = float(value)
+    free = {words[2] for words in entries.get("BOUNDS", []) if words[0] in ("FR", "MI")}
+    return P, q, G, h, {name: -np.inf if name in free else 0.0 for name in columns}
+
+
+@pytest.mark.parametrize(("form", "name"), [("primal", "p.mps"), ("dual", "p.qps"), ("sparse", "p.mps")])
+def test_an_mps_file_has_the_program_and_its_optimum(
+    form: Form, name: str, scenes: Path, tmp_path: Path
+) -> None:
+    """By a reader of our own, to 15 digits; HiGHS reads it back and finds the certified displacements."""
+    import highspy
+
+    source, out = scenes / "strip.toml", tmp_path / name
+    done = harness("export", source, "--form", form, "--out", out)
+    assert done.exit_code == 0, done.output
+    P, q, G, h, lower = read_mps(out)
+    problem = in_form(prepared(read_scene(str(source)), form=form), form)
+    (load,) = problem.loads([load_case(read_scene(str(source)), form)])
+    assert np.allclose(P, dense(sp.block_diag(problem.blocks)), rtol=1e-14, atol=1e-12)
+    assert np.allclose(q, problem.q(load), rtol=1e-14, atol=0)
+    assert set(lower.values()) == {0.0 if form == "dual" else -np.inf}
+    if form != "dual":
+        assert np.allclose(G, dense(problem.G), rtol=1e-14, atol=0)
+        assert np.allclose(h, problem.h(load), rtol=1e-14, atol=0)
+    highs = highspy.Highs()
+    highs.silent()
+    assert highs.readModel(str(out.rename(out.with_suffix(".mps")))) == highspy.HighsStatus.kOk
+    for option in ("qp_regularization_value", "primal_feasibility_tolerance", "dual_feasibility_tolerance"):
+        highs.setOptionValue(option, 0.0 if option[0] == "q" else 1e-10)
+    highs.run()
+    z = np.array(highs.getSolution().col_value)
+    exact, found = solve(str(source)), z if form == "dual" else problem.assembly.at_junction(z)
+    assert found == pytest.approx(exact.lam if form == "dual" else exact.x, abs=1e-7)
+
+
+def test_a_suite_is_a_test_set(scenes: Path, tmp_path: Path) -> None:
+    """As qpbenchmark reads it: P, G and A by rows with as many columns as q has entries."""
+    pytest.importorskip("pyarrow")
+    suite = 'scenes = ["tiny.npz", "strip.toml"]\n[[solver]]\nname = "gi"\n'
+    (scenes / "pair.toml").write_text(suite)
+    out = tmp_path / "pair.parquet"
+    assert harness("export", scenes / "pair.toml", "--form", "primal", "--out", out).exit_code == 0
+    said = subprocess.run(["sha256sum", "-c", f"{out.name}.sha256"], cwd=tmp_path, capture_output=True)
+    assert said.returncode == 0
+    problems = pd.read_parquet(out, engine="pyarrow")
+    assert list(problems["name"]) == ["tiny", "strip"]
+    assert set(problems.columns) == {"P", "q", "G", "h", "A", "b", "lb", "ub", "name"}
+    for line, source in zip(problems.to_dict("records"), ("tiny.npz", "strip.toml"), strict=True):
+        problem = in_form(prepared(read_scene(str(scenes / source)), form="primal"), "primal")
+        assert line["lb"] is line["ub"] is line["A"] is line["b"] is None
+        n = len(line["q"])
+        assert np.array_equal(line["P"].reshape(-1, n), dense(sp.block_diag(problem.blocks)))
+        assert np.array_equal(line["G"].reshape(-1, n), dense(problem.G))
+
+
+@pytest.mark.parametrize("name", ["p.mps", "p.parquet"])
+def test_these_files_hold_no_answer(name: str, scenes: Path, tmp_path: Path) -> None:
+    words = ("--form", "dual", "--with-reference", "--out", tmp_path / name)
+    done = harness("export", scenes / "strip.toml", *words)
+    assert done.exit_code == 2
+    assert "it holds no answer" in done.stderr
