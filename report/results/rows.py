@@ -90,9 +90,9 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
     """Cells with `method`, 'solver (form)' with the variant if it has one and the number of threads
     if several were used, and `label`, the same with the tolerance if there are several that were asked for.
     """
-    variant = cells["variant"].map(lambda name: f" {name}" if name else "")
-    threads = cells["threads"].map(lambda k: f" × {counted(int(k), 'thread')}")
-    tolerance = cells["tolerance"].map(lambda value: f" {tidy_power(value)}")
+    variant = cells["variant"].map(lambda name: f" {name}" if name else "").astype(str)
+    threads = cells["threads"].map(lambda k: f" × {counted(int(k), 'thread')}").astype(str)
+    tolerance = cells["tolerance"].map(lambda value: f" {tidy_power(value)}").astype(str)
     by_line = cells.groupby(["solver", "form", "variant"], dropna=False)
     threads = threads.where(by_line["threads"].transform("nunique") > 1, "")
     several = by_line["tolerance"].transform("nunique") > 1
