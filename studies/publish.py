@@ -26,6 +26,7 @@ import numpy as np
 import pandas as pd
 from PIL import Image
 
+from harness.planning.plan import ROUND, expand
 from harness.planning.suite import read_suite
 from harness.results import records, series_file
 from harness.results.answer_files import pack
@@ -121,7 +122,9 @@ def measure(names: Sequence[str], digits: str) -> list[str]:
 def begin(name: str, directory: Path) -> None:
     """Put the published rows in rounds into a directory, where `run` sets aside what has changed since."""
     published = PUBLISHED / name
-    if kept := [dict(row) for row in rows_of(published) if in_rounds(row)]:
+    rows = [dict(row) for row in rows_of(published) if in_rounds(row)]
+    planned = {m.key for m in expand(read_suite(name))} if rows else set()
+    if kept := [row for row in rows if row["key"].partition(ROUND)[0] in planned]:
         directory.mkdir(parents=True)
         records.rewrite(directory / records.MEASUREMENTS, kept)
         for path in [*published.glob("machine*.json"), *published.glob(records.OUTDATED)]:

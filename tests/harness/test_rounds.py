@@ -89,7 +89,7 @@ def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Suite:
     monkeypatch.setattr(suite_run, "datetime", Clock(timedelta(minutes=1)))
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
     monkeypatch.setattr(published, "STAGED", tmp_path / "publishing")
-    monkeypatch.setattr(published, "read_suite", lambda name: None)
+    monkeypatch.setattr(published, "read_suite", lambda name: made)
     return made
 
 
@@ -155,6 +155,25 @@ def test_only_a_changed_library_is_measured_anew(release: Callable[..., list[Row
     ]
     assert release("third", b="2")
     assert len(read_results(folder).rounds) == 4
+
+
+def test_a_row_of_a_round_is_measured_again_by_its_key(
+    suite: Suite, release: Callable[..., list[Row]], tmp_path: Path
+) -> None:
+    again = next(row for row in release("first") if row["round"])
+    assert suite_run.run(suite, tmp_path / "again", Console(file=StringIO()), key=again["key"]) == 0
+    (row,) = rows_of(tmp_path / "again")
+    assert again["key"] == f"{row['key']} round={again['round']}"
+
+
+def test_a_row_that_is_no_longer_planned_is_not_kept(
+    suite: Suite, release: Callable[..., list[Row]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    release("first")
+    smaller = suite.model_copy(update={"solver": suite.solver[:-1]})
+    monkeypatch.setattr(published, "read_suite", lambda name: smaller)
+    published.begin("small", directory := published.STAGED / "second")
+    assert {row["variant"] for row in rows_of(directory) if row["beside_round"]} == {"a"}
 
 
 def test_after_an_hour_there_is_another_round(
