@@ -53,7 +53,8 @@ class Answer:
     reported_s : float, optional
         Seconds by the solver's own clock, if it has one.
     details : dict
-        All else to record, as JSON types. `products`: products with Q; `cause`: why it is not solved.
+        All else to record, as JSON types. `products`: products with Q; `cause`: why it is not solved;
+        `device`: what it computes on, if that is not the CPU.
     """
 
     status: Status
@@ -121,6 +122,11 @@ class Solver(ABC):
     time_limit_s : float
         Seconds after which a library with a limit of its own is to stop and give its last iterate; set by
         the harness.
+    iteration_limit : int, optional
+        Iterations after which to stop, with the point reached; None: the method's own limit alone. Set by the
+        harness.
+    prints : bool
+        Whether to print a log, which `run` keeps beside the answer; set by the harness.
 
     Notes
     -----
@@ -157,6 +163,12 @@ class Solver(ABC):
     forms: tuple[Form, ...] = DENSE_FORMS
     distribution: ClassVar[str | None] = None
     time_limit_s: float = inf
+    iteration_limit: int | None = None
+    prints: bool = False
+
+    def most(self, usual: int) -> int:
+        """The limit on iterations: the usual one, or `iteration_limit` if that is less."""
+        return usual if self.iteration_limit is None else min(usual, self.iteration_limit)
 
     def convert(self, problem: Problem) -> Any:
         """Bring the data of an assembly into the library's own format; once per assembly.

@@ -62,6 +62,11 @@ class Method(Solver):
         """The data that load cases share: a `State`, or a failed answer for all of them."""
         return State(problem=problem)
 
+    def log(self, **figures: float) -> None:
+        """Print a line with the figures of an iteration, where a log is kept."""
+        if self.prints:
+            print("  ".join(f"{name} {value:.6g}" for name, value in figures.items()))
+
     @abstractmethod
     def solved(self, ready: Any, load: Any, tolerance: float) -> Answer:
         """The answer to a load case: a DualLoadCase in the dual form."""

@@ -58,7 +58,8 @@ NAMES = (
     *("hard", "hard-full", "drawn", "hard-sparse", "outside", "paper", "accuracy"),
 )
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
-#: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.
+#: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this; its
+#: logs, too.
 KEPT_KIB = 3800
 COLOURS = 256
 #: A longer time between two rows is not counted: the run was interrupted.
@@ -192,11 +193,12 @@ def slim(picture: Path) -> None:
 
 
 def _unwanted(directory: Path) -> Iterator[Path]:
-    """What is not published: locks, the scenes' arrays, and answers that are large."""
+    """What is not published: locks, the scenes' arrays, and answers or logs that are large."""
     yield from directory.glob("**/*.lock")
     yield from directory.glob("scenes")
-    if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_KIB * 2**10:
-        yield directory / "answers"
+    for name in ("answers", "logs"):
+        if sum(path.stat().st_size for path in directory.glob(f"{name}/*")) > KEPT_KIB * 2**10:
+            yield directory / name
 
 
 def write_index(folder: Path) -> Path:

@@ -21,14 +21,16 @@ class Forked:
         self, command: Sequence[str], *, env: dict[str, str], pass_fds: Sequence[int], **_: Any
     ) -> None:
         job, self_job = os.pipe()
+        self_stdout, stdout = os.pipe()
         self_stderr, stderr = os.pipe()
         self.returncode: int | None = None
         self.pid = os.fork()
         if self.pid == 0:
-            _become_child(env, job, stderr, *pass_fds)
-        os.close(job)
-        os.close(stderr)
+            _become_child(env, job, stdout, stderr, *pass_fds)
+        for child_end in (job, stdout, stderr):
+            os.close(child_end)
         self.stdin = os.fdopen(self_job, "wb")
+        self.stdout = os.fdopen(self_stdout, "rb", buffering=0)
         self.stderr = os.fdopen(self_stderr, "rb", buffering=0)
 
     def poll(self, options: int = os.WNOHANG) -> int | None:
@@ -41,11 +43,11 @@ class Forked:
         return self.poll(options=0)
 
 
-def _become_child(env: dict[str, str], job: int, stderr: int, events: int) -> NoReturn:
+def _become_child(env: dict[str, str], job: int, stdout: int, stderr: int, events: int) -> NoReturn:
     try:
         os.setsid()
         os.dup2(job, 0)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.dup2(stdout, 1)
         os.dup2(stderr, 2)
         for low, high in ((3, events), (events + 1, 1024)):
             os.closerange(low, high)

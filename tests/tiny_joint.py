@@ -23,6 +23,7 @@ class Exact(Solver):
 """
 
 FAULTY = '''
+import ctypes
 import os
 import signal
 import subprocess
@@ -72,6 +73,7 @@ FAULTS = {
     "write_everywhere": WRITES,
     "big_details": "answer = Answer('solved', answer.lam, details={'trace': 'x' * 2**22})",
     "nan": "answer.lam.fill(np.nan)",
+    "says": "print('one'); ctypes.CDLL(None).puts(b'two'); os.kill(os.getpid(), signal.SIGKILL)",
     "gives_up": "answer = Answer('iteration_limit', None, iterations=5)",
 }
 

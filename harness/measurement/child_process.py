@@ -6,6 +6,7 @@ The call comes pickled through stdin; events go back as JSON lines on the file d
 import contextlib
 import ctypes
 import faulthandler
+import io
 import os
 import pickle
 import signal
@@ -20,6 +21,7 @@ from harness.solving.solver_answer import InvalidAnswer, error_text
 from problems.errors import InputError
 
 TIMEOUT_S = 10.0  # for children that keep forking
+LINE_BUFFERED = 1  # _IOLBF of glibc
 
 
 class Events:
@@ -45,6 +47,7 @@ def main() -> None:
     Functions registered for the exit of the process therefore never run.
     """
     die_with_driver()
+    print_line_by_line()
     faulthandler.enable()
     function, job, descriptor = pickle.load(sys.stdin.buffer)
     events = Events(descriptor)
@@ -71,6 +74,15 @@ def die_with_driver() -> None:
         prctl = ctypes.CDLL(None).prctl
         prctl(set_death_signal, signal.SIGKILL)
         prctl(set_child_subreaper, 1)
+
+
+def print_line_by_line() -> None:
+    """Let Python, and C where it has glibc, pass on each line at once, so that a log survives a kill."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
+    with contextlib.suppress(AttributeError, ValueError):
+        c = ctypes.CDLL(None)
+        c.setvbuf(ctypes.c_void_p.in_dll(c, "stdout"), None, LINE_BUFFERED, 0)
 
 
 def end_children(parent: int) -> None:

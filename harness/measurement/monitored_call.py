@@ -27,6 +27,7 @@ from .child_process import end_children
 ROOT = Path(__file__).parents[2]
 POLL_S = 0.05
 STDERR_TAIL = 2000  # bytes
+LOG_END = 2**16  # bytes: of what it prints, the beginning and the end are kept
 CHUNK = 2**16  # bytes
 LONGEST_EVENT = 2**24  # bytes
 FINAL_READS = 64  # chunks of what a dead process had written
@@ -72,7 +73,8 @@ class Monitored:
         self.phases, self.memory_limit_mib = phases, memory_limit_mib
         self.arrived: list[Row] = []
         self.pending = b""
-        self.stderr = b""
+        self.stderr = self.log_start = self.log_rest = b""
+        self.log_cut = 0  # bytes between these
         self.peak_mib = 0.0
         self.descendants: set[psutil.Process] = set()
         self.phase, self.limit_s = next(iter(phases.items()))
@@ -82,7 +84,7 @@ class Monitored:
             self.process = subprocess.Popen(
                 [python, "-P", "-m", "harness.measurement.child_process", function.__qualname__],
                 stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 env=environment(threads),
                 pass_fds=(events_of_child,),
@@ -93,9 +95,11 @@ class Monitored:
         self.root = psutil.Process(self.process.pid)
         self.events = open(events, "rb", buffering=0)  # noqa: SIM115
         assert self.process.stdin is not None
+        assert self.process.stdout is not None
         assert self.process.stderr is not None
         self.selector = selectors.DefaultSelector()
-        for stream, take in ((self.events, self._take_events), (self.process.stderr, self._take_stderr)):
+        outputs = (self.process.stdout, self._take_printed), (self.process.stderr, self._take_stderr)
+        for stream, take in ((self.events, self._take_events), *outputs):
             os.set_blocking(stream.fileno(), False)
             self.selector.register(stream, selectors.EVENT_READ, take)
         with contextlib.suppress(BrokenPipeError):
@@ -129,7 +133,7 @@ class Monitored:
                     return
 
     def _listen(self, seconds: float) -> None:
-        """Receive its events and its stderr, for at most `seconds`."""
+        """Receive its events and what it prints, for at most `seconds`."""
         for key, _ in self.selector.select(seconds):
             chunk = os.read(key.fd, CHUNK)
             if chunk:
@@ -155,6 +159,20 @@ class Monitored:
 
     def _take_stderr(self, chunk: bytes) -> None:
         self.stderr = (self.stderr + chunk)[-STDERR_TAIL:]
+        self._take_printed(chunk)
+
+    def _take_printed(self, chunk: bytes) -> None:
+        room = LOG_END - len(self.log_start)
+        self.log_start += chunk[:room]
+        rest = self.log_rest + chunk[room:]
+        self.log_cut += max(len(rest) - LOG_END, 0)
+        self.log_rest = rest[-LOG_END:]
+
+    @property
+    def log(self) -> str:
+        """What it printed on stdout and stderr, in the order in which it came, as far as that is kept."""
+        cut = f"\n[{self.log_cut} bytes left out]\n".encode() if self.log_cut else b""
+        return (self.log_start + cut + self.log_rest).decode(errors="replace")
 
     @property
     def stderr_text(self) -> str | None:
@@ -214,7 +232,7 @@ class Monitored:
                 process.kill()
         self.process.wait()
         self.selector.close()
-        for stream in (self.events, self.process.stdin, self.process.stderr):
+        for stream in (self.events, self.process.stdin, self.process.stdout, self.process.stderr):
             if stream is not None:
                 with contextlib.suppress(BrokenPipeError):  # it died before it read its job
                     stream.close()

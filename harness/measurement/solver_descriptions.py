@@ -172,11 +172,11 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
 
     def is_old(row: Row) -> bool:
         m = planned.get(row["key"])
-        return m is not None and outdated(row, m, solvers[m.solver, m.variant], scene_keys[m.scene])
+        return m is not None and outdated(row, m, solvers[m.solver, m.entry.label], scene_keys[m.scene])
 
     old = [row for row in rows if is_old(row)]
     if old:
-        records.append(directory / records.OUTDATED, *(row | {"answer": None} for row in old))
+        records.append(directory / records.OUTDATED, *(row | {"answer": None, "log": None} for row in old))
         rows = [row for row in rows if row not in old]
         records.rewrite(path, rows)
         aside = f"Set aside in {records.OUTDATED}, to be measured again: {counted(len(old), 'row')}"

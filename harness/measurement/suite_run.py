@@ -155,7 +155,7 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task([m, *others], self.solvers[m.solver, m.variant])
+            task = Task([m, *others], self.solvers[m.solver, m.entry.label])
             yield (task, problem), task
 
     def due(self, remaining: list[Measurement]) -> Iterator[list[Measurement]]:
@@ -166,7 +166,7 @@ class Measuring:
             if m is None:
                 self.display.passed_over(len(batch))
                 continue
-            ours = m.entry.beside or self.solvers[m.solver, m.variant].owner == "ours"
+            ours = m.entry.beside or self.solvers[m.solver, m.entry.label].owner == "ours"
             if ours or not any(entry.beside for entry in m.suite.solver):
                 yield [m, *batch[1:]]
                 continue

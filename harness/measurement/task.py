@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.planning.plan import Measurement
+from harness.results import records
 from harness.results.provenance import installed_version, machine, provenance
 from harness.results.records import Row
 from harness.results.schema import MEASURED, STEPS, MeasurementRow, Origin, Provenance
@@ -76,7 +77,11 @@ def rows_of(
         if content is not None:
             answer.write_bytes(content)
     cases = zip(task.batch, answers, result.reports, strict=True)
-    return [_row(*case, task.solver, problem, result.elapsed_s, origin) for case in cases]
+    log = f"logs/{task.batch[0].stem}.txt" if (printed := result.reports[0].get("printed")) else None
+    if log and printed:
+        records.replace_text(directory / log, printed)
+    rows = [_row(*case, task.solver, problem, result.elapsed_s, origin) for case in cases]
+    return [row | {"log": log} for row in rows]
 
 
 def why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | None:
@@ -116,6 +121,7 @@ def _row(
         "m": problem.prepared.assembly.m,
         "active": int(problem.reference.active.sum()),
         "tolerance": m.tolerance,
+        "iteration_limit": m.iteration_limit,
         "searched": m.searched,
         "repeat": m.repeat,
         "round": m.round or None,

@@ -17,7 +17,7 @@ import threadpoolctl
 from scipy.linalg import lapack
 
 from harness.planning.plan import Measurement
-from harness.results.provenance import blas_kernels, resident_mib
+from harness.results.provenance import blas_kernels, cpu_model, resident_mib
 from harness.results.records import Row
 from harness.results.schema import Report
 from harness.solving.session import SolverSession
@@ -41,13 +41,18 @@ PAGE = 4096
 OWN_LIMIT = 0.97  # of the time limit, for a library that stops by itself
 YARDSTICK_REPEATS = 3
 #: The fields that are reported once for all the load cases of a series.
-SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib")
+SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib", "device")
 
 
 class Outcome(Report, total=False):
-    """A report at its end. cannot_save : why the answer's file cannot be written, which ends the run."""
+    """A report at its end.
+
+    cannot_save : why the answer's file cannot be written, which ends the run. printed : by the process, with
+    the first of its measurements.
+    """
 
     cannot_save: str
+    printed: str
 
 
 class Unsupported(InvalidAnswer):
@@ -80,6 +85,7 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
         last["stderr"] = process.stderr_text
         if last["status"] == "time_limit" and "iterations" not in last:
             last["message"] = f"{last['message']}; iterations and error are unknown"
+        finished[0]["printed"] = process.log
     ended = measurements[len(finished) - 1].key
     lost: Outcome = {"status": last["status"], "message": f"not run: {ended} ended the process"}
     return finished + [lost] * (len(measurements) - len(finished))
@@ -110,6 +116,9 @@ class Run(Reporter):
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
         solver = make_solver(m.solver, m.entry.options, plugin)
+        vars(solver).update(prints=True, time_limit_s=OWN_LIMIT * m.time_limit_s)  # it may be frozen
+        if m.iteration_limit is not None:
+            vars(solver)["iteration_limit"] = m.iteration_limit
         if m.form not in solver.forms:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.step("load_s"):
@@ -185,8 +194,7 @@ class Run(Reporter):
         """Start the clock of the solver; before the first load case, convert and prepare."""
         self.events.report(phase="solve")
         if not session.opened:
-            self.events.report(data_mib=resident_mib("VmRSS"))
-            session.solver.time_limit_s = OWN_LIMIT * self.first.time_limit_s
+            self.events.report(data_mib=resident_mib("VmRSS"), device=cpu_model())
             session.open(batched=self.first.entry.batched is not None)
 
     def saved(

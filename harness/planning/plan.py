@@ -22,6 +22,8 @@ HALF_DECADES = [float(text) for k in range(3, 17) for text in (f"1e-{k}", f"3e-{
 MOST_REPEATS = 5  # of "auto"
 ROUND_REPEATS = 3  # at most, of what is measured in a round
 ROUND = " round="  # before the time, in the keys of a round
+#: After which a trace stops a solver.
+ITERATION_LIMITS = [2**k for k in range(20)]
 BEST = 1.0
 
 
@@ -33,7 +35,8 @@ class Measurement:
     path for `read_scene`. case : the number of the load case in a series. guide : the scene whose rows decide
     whether a library's form is measured on this one, and how many times as long as its best it may take there
     (tolerance_search.py); None if all forms are. round : when a round began, in which an entry with `beside`
-    is measured again; beside_round : the round beside which this one is measured.
+    is measured again; beside_round : the round beside which this one is measured. iteration_limit : in a
+    trace, after which the solver stops.
     """
 
     suite: Suite
@@ -49,6 +52,7 @@ class Measurement:
     guide: tuple[str, float] | None = None
     round: str = ""
     beside_round: str = ""
+    iteration_limit: int | None = None
 
     @property
     def solver(self) -> str:
@@ -56,7 +60,9 @@ class Measurement:
 
     @property
     def variant(self) -> str:
-        return self.entry.label
+        """The entry's label, and the limit on iterations."""
+        limit = "" if self.iteration_limit is None else f" at most {self.iteration_limit} iterations"
+        return f"{self.entry.label}{limit}".strip()
 
     @property
     def searched(self) -> bool:
@@ -168,16 +174,16 @@ def _of_entry(suite: Suite, entry: SolverEntry, scene: Scene, source: str) -> It
     repeats = entry.repeats or suite.repeats
     n, _ = scene.expected_size or (0, 0)
     time_limit_s = entry.time_limit_s or suite.time_limit(n)
-    for form, tolerance, threads, repeat, case in product(
+    for form, tolerance, iteration_limit, threads, repeat, case in product(
         entry.forms or FORMS,
         HALF_DECADES if tolerances == "auto" else tolerances,
+        (None, *ITERATION_LIMITS) if suite.trace else (None,),
         entry.threads or suite.threads,
         range(MOST_REPEATS if repeats == "auto" else repeats),
         range(entry.cases or suite.series.cases) if suite.series else (None,),
     ):
-        yield Measurement(
-            suite, entry, scene.name, source, form, tolerance, threads, repeat, time_limit_s, case
-        )
+        at = form, tolerance, threads, repeat, time_limit_s, case
+        yield Measurement(suite, entry, scene.name, source, *at, iteration_limit=iteration_limit)
 
 
 def round_beside(m: Measurement, time: str) -> list[Measurement]:
@@ -185,7 +191,11 @@ def round_beside(m: Measurement, time: str) -> list[Measurement]:
     scene = read_scene(m.source)
     entries = (e for e in m.suite.solver if e.beside and _applies(e, scene.name, m.source))
     of_scene = (each for e in entries for each in _of_entry(m.suite, e, scene, m.source))
-    return [replace(each, round=time) for each in of_scene if each.repeat < ROUND_REPEATS]
+    return [
+        replace(each, round=time)
+        for each in of_scene
+        if each.repeat < ROUND_REPEATS and each.iteration_limit is None
+    ]
 
 
 def _round_and_place(m: Measurement) -> tuple[int, float]:

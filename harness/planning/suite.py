@@ -125,6 +125,7 @@ class Suite(BaseModel):
     """The content of a suite file; scenes are names, or absolute paths of files. `name` is the file's.
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
+    trace also stops each solver after 1, 2, 4, … iterations, as long as these are fewer than it takes.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
     times_best_form leaves out forms in which a library is slow on smaller scenes (tolerance_search.py). After
     reference_limit_s no further method is tried for a reference; by default 60 s per thousand contacts, at
@@ -147,6 +148,7 @@ class Suite(BaseModel):
     reference_limit_s: Positive | None = None
     limit_mm: Positive = 1e-7
     yardstick: bool = False
+    trace: bool = False
     plugin: str | None = None
     series: RandomCases | None = None
     solver: Annotated[list[SolverEntry], NonEmpty]

@@ -27,6 +27,11 @@ def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
     """The measurement in m's place in the plan, at the next tolerance of a search; None if there is none."""
     if not in_a_good_form(m, rows):
         return None
+    if m.iteration_limit is not None:
+        same = [
+            row for row in _of_cell(replace(m, iteration_limit=None), rows) if row["tolerance"] == m.tolerance
+        ]
+        return None if any((row["iterations"] or 0) <= m.iteration_limit for row in same) else m
     first = [row for row in _of_cell(m, rows) if row["repeat"] == 0]
     if m.searched:
         tolerance = next_tolerance(m, rows)

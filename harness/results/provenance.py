@@ -77,7 +77,7 @@ def _git(*arguments: str) -> str | None:
 
 def machine() -> dict[str, Any]:
     """CPU, cores, memory, system, BLAS kernels and versions; `machine` names it in one line."""
-    cpu, cores = _cpu_model(), usable_cores()
+    cpu, cores = cpu_model(), usable_cores()
     system = f"{platform.system()} {platform.release()}"
     return {
         "machine": f"{cpu}, {cores} cores, {system}",
@@ -123,7 +123,8 @@ def installed_version(package: str) -> str:
         return "unknown"
 
 
-def _cpu_model() -> str:
+def cpu_model() -> str:
+    """The name of the CPU."""
     info = Path("/proc/cpuinfo")
     for line in info.read_text().splitlines() if info.exists() else []:
         if line.startswith("model name"):

@@ -186,7 +186,7 @@ def refuse_other(path: Path, recorded: Row, identity: Row) -> None:
 
 @contextmanager
 def locked(
-    directory: Path, folders: Sequence[str] = ("answers", "scenes"), other: str = SERIES
+    directory: Path, folders: Sequence[str] = ("answers", "scenes", "logs"), other: str = SERIES
 ) -> Iterator[None]:
     """Create the directory and lock it against a second run. Raises InputError if that fails, or if results
     of the other kind are there: the file `other`.

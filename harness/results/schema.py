@@ -95,6 +95,7 @@ class Report(TypedDict, total=False):
     message: str | None  # why there is no answer, or no good one
     kernels: str | None  # the BLAS libraries loaded
     stderr: str | None  # its end
+    device: str | None  # the CPU, or what the solver names
     answer: str | None  # the file of the answer, in the directory
     stages: str  # K, and which of `factors` and `Q` of the dense forms were opened
     iterations: int | None
@@ -142,6 +143,7 @@ class MeasurementRow(Report, Origin, total=False):
     form: str
     variant: str
     tolerance: float
+    iteration_limit: int | None  # in a suite with `trace`
     searched: bool  # the tolerance is one of those tried for the loosest that suffices
     repeat: int
     round: str | None  # when the round began in which it was measured again, beside others of its scene
@@ -167,6 +169,7 @@ class MeasurementRow(Report, Origin, total=False):
     rivetbench_version: str
     recorded_at: str
     overhead_s: float | None  # of the measurement, beside load_s and the steps
+    log: str | None  # the file of what the process printed, in the directory
 
 
 #: The kind of a field in JSON. An object's names depend on the solver, the series or the scene.

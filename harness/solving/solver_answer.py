@@ -159,6 +159,7 @@ def figures(answer: Answer) -> Report:
         "solver_reported_s": answer.reported_s,
         "message": answer.cause,
         "details": answer.details,
+        **({"device": str(answer.details["device"])} if "device" in answer.details else {}),
     }
 
 

@@ -32,7 +32,7 @@ from report.results.rows import CELL, in_order
 TEXTS = (
     *("scene", "method", "label", "solver", "owner", "form", "variant", "status", "verdict", "machine"),
     *("title", "ladder", "contact", "message", "solver_version", "solver_code"),
-    *("commit", "recorded_at", "key"),
+    *("commit", "recorded_at", "device", "log", "key"),
 )
 NUMBERS = (
     *("n", "m", "active", "tolerance", "threads", "repeats", "iterations", "inner_iterations"),
@@ -136,7 +136,8 @@ def _range(cells: pd.DataFrame, names: list[str]) -> tuple[float, float]:
 
 def _cells(results: Results) -> pd.DataFrame:
     """The cells without the forms that a solver does not take, with the limits and seconds from the scene."""
-    cells = results.cells[results.cells["status"] != "unsupported"]
+    cells = results.about("whole").cells
+    cells = cells[cells["status"] != "unsupported"]
     cells = cells.rename(columns={"reference_bound_mm": "bound_mm"})
     lines = roads(results)
     if len(lines):

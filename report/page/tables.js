@@ -67,6 +67,7 @@ function openRow() {
   dialog.replaceChildren(el("form", {method: "dialog"}, el("button", {}, "close")),
     el("h2", {}, `${cell.label} on ${cell.scene}`),
     el("p", {}, "To measure it again: ", el("code", {}, `python -m harness run ${place} --out results/again`)),
-    el("table", {}, facts.map(name => el("tr", {}, el("th", {}, words(name)), el("td", {}, String(cell[name]))))));
+    el("table", {}, facts.map(name => el("tr", {}, el("th", {}, words(name)), el("td", {},
+      name === "log" ? el("a", {href: `../${cell.log}`}, cell.log) : String(cell[name]))))));
   if (!dialog.open) dialog.showModal();
 }

@@ -5,6 +5,7 @@ with the repeats merged.
 """
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -24,6 +25,7 @@ from .rows import VERSION, frame
 
 MOST_SHOWN = 40  # scenes drawn at random: more have a section of their own alone
 FAR_AWAY = 1e15  # mm: no picture is so large
+LOG = re.compile(r"logs/[\w.+-]+\.txt")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +85,13 @@ class Results:
 
     def about(self, what: str) -> "Results":
         """The results on rungs of "ladders", on scenes "drawn" at random, on all "scenes" that are shown
-        one by one, or "all".
+        one by one, or "all"; only these have the runs that a trace stopped, "whole" has all others.
         """
-        names = self.rows["scene"].str
+        names, traced = self.rows["scene"].str, self.rows["iteration_limit"].notna()
         own = {"ladders": names.startswith(LADDERS), "drawn": names.startswith((DRAWN, SPARSE))}
+        own = {name: rows & ~traced for name, rows in own.items()} | {"whole": ~traced}
         many = own["drawn"] & (self.rows.loc[own["drawn"], "scene"].nunique() > MOST_SHOWN)
-        others = ~(own["ladders"] | many)
+        others = ~(own["ladders"] | many | traced)
         rows = self.rows if what == "all" else self.rows[own.get(what, others)].reset_index(drop=True)
         return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 
@@ -116,6 +119,10 @@ def read(directory: Path) -> Results:
     facts = [_loaded(file, json.loads, more) for file in sorted(directory.glob("machine*.json"))]
     machines = {str(fact.get("machine", "")): fact for fact in facts}
     rows = frame(records)
+    logs = map(plain, rows["log"])
+    rows = rows.assign(
+        log=[log if LOG.fullmatch(log) and (directory / log).is_file() else "" for log in logs]
+    )
     left_out, again = len(records) - len(rows), rows["round"] != ""
     rows, rounds = (rows[of].reset_index(drop=True) for of in (~again, again))
     read = rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out

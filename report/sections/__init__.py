@@ -17,12 +17,14 @@ from . import (
     history,
     ladders,
     outside,
+    profile,
     random_scenes,
     series_throughput,
     sparse_problems,
     speed,
     summary,
     time_to_solution,
+    trace,
     versions,
 )
 
@@ -37,6 +39,8 @@ SECTIONS: list[tuple[About, Callable[[Results], Section | None]]] = [
     ("scenes", time_to_solution.how_fast),
     ("scenes", summary.advice),
     ("scenes", summary.summary),
+    ("scenes", profile.section),
+    ("all", trace.section),
     ("all", versions.section),
     ("all", history.section),
     ("scenes", time_to_solution.section),

@@ -22,7 +22,7 @@ FIGURES = [
     *("form_s", "load_case_s", "least_s", "most_s", "once_s", "total_s", "solver_reported_s"),
     *("displacement_error_mm", "limit_mm", "reference_bound_mm", "contact_mismatch", "min_gap_mm"),
     *("primal_residual", "dual_residual", "duality_gap", "peak_rss_mib", "time_limit_s"),
-    *("memory_limit_mib", "message"),
+    *("memory_limit_mib", "message", "device", "log"),
 ]
 MARKS = {"within": "✓ within", "outside": "✗ outside", "cannot_be_judged": "? cannot be judged"}
 
@@ -46,7 +46,7 @@ def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any]) -> Table
     columns = [
         word("solver (form)", "label"),
         Column("verdict", _verdict, "left"),
-        Column("status", lambda row: str(row["status"]).replace("_", " "), "left"),
+        Column("status (log)", _status, "left"),
         number("error, mm", "displacement_error_mm", power),
         Column("iterations (inner)", _iterations),
         number("per load case, s", "load_case_s"),
@@ -65,6 +65,11 @@ def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any]) -> Table
 def _verdict(row: Mapping[str, Any]) -> str:
     mark = MARKS.get(row["verdict"], MISSING)
     return f"[{mark}](index.html#{urlencode({'row': plain(row['key'])})})" if row["key"] else mark
+
+
+def _status(row: Mapping[str, Any]) -> str:
+    status = str(row["status"]).replace("_", " ")
+    return f"[{status}](../{row['log']})" if row["log"] else status
 
 
 def _iterations(row: Mapping[str, Any]) -> str:
@@ -92,7 +97,7 @@ Each measurement runs in its own process; the clock starts after the imports.
   g, x = K⁻¹(f − Aλ); *sparse*, the primal in all unknowns of the finite-element model.
 - **error**: max |x − x*| in mm, x* the reference answer.
 - **verdict**: the judge's, from the error alone; *cannot be judged* if the reference's error bound is large.
-- **status**: what the solver reported, or what ended the run.
+- **status**: what the solver reported, or what ended the run; a link leads to what it printed.
 - **iterations (inner)**: for an active-set method changes of the active set.
 - **convert**, **prepare**: once per assembly. **Set-up**, **solve**, **form** (p and x of the dual): once per
   load case, its time their sum. **Total**: that, convert and prepare.
@@ -108,6 +113,7 @@ def machine(results: Results) -> Section | None:
     facts = {"machine": rows["machine"].iloc[0]} | _flat(results.machines.get(rows["machine"].iloc[0], {}))
     times = sorted(time for time in rows["recorded_at"] if time)
     facts |= {
+        "device": _values(rows["device"]),
         "threads in effect": _values(rows["threads"]),
         "BLAS kernels in effect": _values(rows["kernels"]),
         "time limit, s": _values(rows["time_limit_s"]),

@@ -78,7 +78,8 @@ class Sweeps:
     """Solves load cases of one assembly with M ≈ Q⁻¹, or with factors of Q_CC or K where there is no M.
 
     diagonal : of Q, or about that, (m,) mm/N. order : of the contacts in M. compliance : the diagonal in this
-    order. last : the cases solved last, from which the next ones start.
+    order. last : the cases solved last, from which the next ones start. most : the limit on sweeps. log :
+    takes the figures of each sweep.
 
     A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ), ρ the rounding of
     Qλ − p (`kkt.largest_rounding`), and r = max(|y_C|, max(−y)) is at most 0.02 tolerance; or does not halve
@@ -87,6 +88,8 @@ class Sweeps:
 
     prepared: Prepared
     last: list[Case] = field(default_factory=list)
+    most: int = MAX_SWEEPS
+    log: Callable[..., None] = lambda **figures: None
 
     def __post_init__(self) -> None:
         near = self.prepared.approximate_inverse
@@ -156,7 +159,7 @@ class Sweeps:
             y = self.gaps(lam[:, None], [case.load])[:, 0]
             residual = kkt_residual(lam, y)
         enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
-        limit = "" if case.settled else f"{MAX_SWEEPS} products"
+        limit = "" if case.settled else f"{self.most} products"
         status: Status = "solved" if enough else "inaccurate"
         details, counts = {"closed": int(case.C.sum())}, (case.sweeps, case.sets)
         return dual_answer(status, lam, residual, details, counts, limit)
@@ -194,7 +197,7 @@ class Sweeps:
         active = cases
         if self.M is None:
             self.sets.begin()
-        for _ in range(MAX_SWEEPS):
+        for _ in range(self.most):
             steps = []  # λ, whether the set is unchanged, and whether y follows by its change
             for case in active:
                 lam, same = self._step(case)
@@ -212,6 +215,7 @@ class Sweeps:
                 if not change:
                     case.doubt = rounding_of(case.load.p[order], gap)
                 self._take(case, lam, case.trial.y + gap if change else gap, whole, tolerance)
+                self.log(sweep=case.sweeps, sets=case.sets, closed=case.C.sum(), residual_mm=case.residual)
             active = [case for case in active if not case.settled]
             if not active:
                 break

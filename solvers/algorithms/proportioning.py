@@ -112,10 +112,11 @@ class Proportioning:
     steps: dict[str, int] = field(default_factory=lambda: {"cg": 0, "expansion": 0, "proportioning": 0})
     last_step: tuple[Vector, Vector, Mask] | None = None
 
-    def solve(self, tolerance: float, max_products: int) -> bool:
+    def solve(self, tolerance: float, max_products: int, log: Callable[..., None]) -> bool:
         """Steps until the KKT residual is at most max(tolerance/10, rounding) mm or rounding prevents more.
 
         False if `max_products` were not enough. λ and y then have the smallest residual that was recomputed.
+        log : takes the figures of each recomputation.
         """
         best, since, stalled = (np.inf, self.lam, self.y), 0, 0
         while True:
@@ -128,6 +129,7 @@ class Proportioning:
             self.y, self.last_step, since = self.gaps(self.lam), None, 0
             self.products += 1
             residual = kkt_residual(self.lam, self.y)
+            log(products=self.products, residual_mm=residual)
             stalled = 0 if moved or residual < best[0] / 2 else stalled + 1
             best = min(best, (residual, self.lam, self.y), key=lambda point: point[0])
             done = residual <= target or stalled == STALLED or (stalled and residual <= tolerance)

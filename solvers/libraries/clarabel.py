@@ -47,8 +47,8 @@ class Clarabel(Library):
 
     def _settings(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         settings = self.defaults()
-        settings.verbose = False
-        settings.max_iter = 500
+        settings.verbose = self.prints
+        settings.max_iter = self.most(500)
         settings.time_limit = self.time_limit_s
         settings.tol_feas = tolerance
         settings.tol_gap_abs = gap_tolerance(tolerance, load)

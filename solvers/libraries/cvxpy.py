@@ -1,9 +1,9 @@
-"""CVXPY, a modelling language, which calls OSQP or Clarabel, https://www.cvxpy.org: the cost of modelling.
+"""CVXPY, a modelling language for OSQP, Clarabel or QOCO, https://www.cvxpy.org: the cost of modelling.
 
 The set-up is CVXPY's compilation of the model, the solve is the solver with CVXPY's own conversion of its
 answer. The model has P, G as constants and q, h as parameters, so that a further load case is not compiled
-again. The tolerance is passed on as OSQP's `eps_abs` or as Clarabel's three, with relative ones 0; all else
-is left at CVXPY's defaults, as a user would have it.
+again. The tolerance is passed on as OSQP's `eps_abs`, QOCO's `abstol` or Clarabel's three, with relative ones
+0; all else is left at CVXPY's defaults, as a user would have it.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ STATUS: dict[str, Status] = {
     cp.USER_LIMIT: "iteration_limit",
 }
 #: CVXPY's own choice for a quadratic program, and those that may be asked for.
-SOLVERS = (None, cp.OSQP, cp.CLARABEL)
+SOLVERS = (None, cp.OSQP, cp.CLARABEL, cp.QOCO)
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Model:
 
 
 class Cvxpy(Solver):
-    """via : "OSQP", "CLARABEL", or None for CVXPY's own choice, which is OSQP."""
+    """via : "OSQP", "CLARABEL", "QOCO", or None for CVXPY's own choice, which is OSQP."""
 
     forms = FORMS
 
@@ -79,10 +79,11 @@ class Cvxpy(Solver):
         gap = gap_tolerance(tolerance, load)
         name = model.chain.solver.name()
         settings = {
-            cp.OSQP: {"eps_abs": tolerance, "eps_rel": 0.0, "max_iter": 1_000_000},
+            cp.OSQP: {"eps_abs": tolerance, "eps_rel": 0.0, "max_iter": self.most(1_000_000)},
             cp.CLARABEL: {"tol_feas": tolerance, "tol_gap_abs": gap, "tol_gap_rel": 0.0},
+            cp.QOCO: {"abstol": tolerance, "reltol": 0.0, "max_iters": self.most(500)},
         }[name]
-        raw = model.chain.solve_via_data(model.problem, model.data, solver_opts=settings)
+        raw = model.chain.solve_via_data(model.problem, model.data, verbose=self.prints, solver_opts=settings)
         try:
             model.problem.unpack_results(raw, model.chain, model.inverse)
         except cp.SolverError as error:

@@ -48,11 +48,11 @@ class Osqp(Library):
             "eps_abs": tolerance,
             "eps_rel": 0.0,
             "check_dualgap": True,
-            "max_iter": 1_000_000,
+            "max_iter": self.most(1_000_000),
             "time_limit": min(self.time_limit_s, NO_TIME_LIMIT),
             "adaptive_rho": RHO_BY_ITERATIONS,
             "adaptive_rho_interval": 50,
-            "verbose": False,
+            "verbose": self.prints,
         }
         library = osqp.OSQP()
         library.setup(state.P, q, state.G, *bounds, **settings | self.selected | self.settings)

@@ -47,7 +47,7 @@ class Piqp(Library):
         library = piqp.SparseSolver() if sp.issparse(state.P) else piqp.DenseSolver()
         settings = library.settings
         set_absolute(settings, tolerance, load)
-        settings.max_iter = 500
+        settings.max_iter, settings.verbose = self.most(500), self.prints
         if is_sparse(state.problem.blocks):
             settings.kkt_solver = getattr(piqp, self.selected["kkt_solver"])
         apply(settings, self.settings)

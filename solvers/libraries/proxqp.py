@@ -57,7 +57,8 @@ class ProxQp(Library):
             library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
         settings = library.settings
         set_absolute(settings, tolerance, load)
-        settings.max_iter = settings.max_iter_in = 100_000
+        settings.max_iter, settings.max_iter_in = self.most(100_000), 100_000
+        settings.verbose = self.prints
         apply(settings, self.settings)
         if h is None:
             library.init(H=state.P, g=q, l_box=np.zeros_like(q), u_box=np.full_like(q, INFINITY))

@@ -39,16 +39,32 @@ TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "pyqpmad": lambda tol, gap: {"tolerance": tol, "max_iter": 1_000_000},
     "qpalm": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "eps_rel_in": 0.0, "max_iter": 1_000_000},
     "qtqp": lambda tol, gap: {"tol_feas": tol, "tol_gap_abs": gap, "tol_gap_rel": 0.0, "max_iter": 1_000},
+    "sip": lambda tol, gap: {
+        "termination": {
+            "max_absolute_residual": tol,
+            "max_absolute_duality_gap": gap,
+            "max_relative_residual": 0.0,
+            "max_relative_duality_gap": 0.0,
+        },
+        "max_iterations": 1_000,
+    },
     "scs": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "max_iters": 10_000_000},
 }
 #: The option of a limit in seconds, of those that give their last iterate then.
 TIME_LIMIT = {"highs": "time_limit", "qpalm": "time_limit", "scs": "time_limit_secs"}
 
+#: The settings that limit the iterations.
+LIMITS = ("max_iter", "max_iters", "maxiters", "max_iterations")
+#: The settings that print a log, where qpsolvers' `verbose` does more: checks, lines of each line search.
+LOGS: dict[str, dict[str, Any]] = {
+    "highs": {"log_to_console": True},
+    "sip": {"logging": {"print_logs": True}},
+}
 #: The solvers that overwrite P with its factor.
 OVERWRITE = ("pyqpmad",)
 
 #: Distributions that have another name than the solver.
-DISTRIBUTIONS = {"highs": "highspy"}
+DISTRIBUTIONS = {"highs": "highspy", "sip": "sip-qp-python"}
 
 
 class QpSolvers(Solver):
@@ -85,6 +101,9 @@ class QpSolvers(Solver):
         settings = options(tolerance, gap_tolerance(tolerance, load)) if options else {}
         if self.name in TIME_LIMIT and isfinite(self.time_limit_s):
             settings[TIME_LIMIT[self.name]] = self.time_limit_s
+        settings |= {key: self.most(settings[key]) for key in LIMITS if key in settings}
+        if self.prints:
+            settings |= LOGS.get(self.name, {"verbose": True})
         try:
             solution = qpsolvers.solve_problem(problem, self.name, **settings | self.settings)
         except QPError as error:

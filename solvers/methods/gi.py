@@ -65,7 +65,7 @@ class GoldfarbIdnani(Method):
         else:
             p = data.prepared.with_p([load])[0].p
             slacks = _dual_slacks(ready, p)
-        limit = MAX_PIVOTS * len(ready.G) + 10
+        limit = self.most(MAX_PIVOTS * len(ready.G) + 10)
         result = goldfarb_idnani(ready.G, slacks, tolerance, limit)
         if not np.isfinite(result.u).all():
             return failed("rounding: the multipliers are no longer finite", result.pivots)

@@ -151,8 +151,10 @@ class Ipm(Method):
     def _iterate(self, newton: NewtonSteps, point: Point, tolerance: float) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8: status, cause and the last finite point."""
         smallest, stalled = np.inf, 0
-        for _ in range(MAX_ITERATIONS):  # step 4
+        most = self.most(MAX_ITERATIONS)
+        for _ in range(most):  # step 4
             measure = self._measure(newton, point, tolerance)
+            self.log(mu=point.mu, infeasibility=point.infeasibility, to_tolerance=measure)
             if measure <= 1:
                 return "solved", "", point
             stalled = 0 if measure < smallest else stalled + 1
@@ -170,7 +172,7 @@ class Ipm(Method):
             if not (np.isfinite(values) & (values > 0)).all():
                 return "failed", "λ or y is no longer finite and positive", point
             point = following
-        return "iteration_limit", f"{MAX_ITERATIONS} iterations", point
+        return "iteration_limit", f"{most} iterations", point
 
     @np.errstate(over="ignore")
     def _measure(self, newton: NewtonSteps, point: Point, tolerance: float) -> float:

@@ -45,7 +45,7 @@ class FastIpm(Method):
 
     def state(self, problem: Problem) -> _State:
         """The state with M and the Newton systems."""
-        finish = Sweeps(problem.prepared)
+        finish = Sweeps(problem.prepared, log=self.log)
         system = Banded(problem.Q, finish.M) if finish.M else Direct(problem.Q)
         return _State(problem=problem, system=system, finish=finish)
 
@@ -58,13 +58,16 @@ class FastIpm(Method):
         point = newton.at(start.lam, start.y)
         details: dict[str, Any] = {"start": {"mu": point.mu}}
         identifying_mu, least, stalled = IDENTIFICATION_RATIO * point.mu, np.inf, 0
-        for k in range(MAX_ITERATIONS):
+        most = self.most(MAX_ITERATIONS)
+        for k in range(most):
             ratio = compliance * point.lam / point.y
             undecided = int(((ratio > 0.1) & (ratio < 10)).sum())
             residual = float(abs(np.minimum(compliance * point.lam, point.gap)).max())
             stalled = 0 if residual < least else stalled + 1
             least = min(least, residual)
-            details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
+            figures = {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
+            self.log(**figures)
+            details |= figures
             done = residual <= tolerance or stalled == STALLED
             if done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p)):
                 case = ready.finish.solved(load, tolerance, C=ratio > 1)
@@ -74,5 +77,5 @@ class FastIpm(Method):
             point = mehrotra(newton, point)
             if not np.isfinite(point.mu):
                 return failed("λ or y overflowed", k)
-        details["cause"] = f"{MAX_ITERATIONS} iterations"
-        return Answer("iteration_limit", point.lam, iterations=MAX_ITERATIONS, details=details)
+        details["cause"] = f"{most} iterations"
+        return Answer("iteration_limit", point.lam, iterations=most, details=details)

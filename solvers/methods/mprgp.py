@@ -90,11 +90,12 @@ class Mprgp(Method):
 
         first = first_point(ready.dual_start, dual)
         case = Proportioning(prepared.compliance, dual.p, ready.diagonal, metric, gaps, *first)
-        enough = case.solve(tolerance, MAX_PRODUCTS)
+        most = self.most(MAX_PRODUCTS)
+        enough = case.solve(tolerance, most, self.log)
         residual = kkt_residual(case.lam, case.y)
         solved = residual <= max(tolerance, largest_rounding(ready.diagonal, dual.p, case.lam))
         status: Status = "solved" if solved else "inaccurate"
         details = {"products": case.products, "steps": case.steps}
-        counts, limit = (sum(case.steps.values()), metric.sets), "" if enough else f"{MAX_PRODUCTS} products"
+        counts, limit = (sum(case.steps.values()), metric.sets), "" if enough else f"{most} products"
         answer = dual_answer(status, case.lam, residual, details, counts, limit)
         return with_x(ready.problem, [answer], [load], tolerance)[0]

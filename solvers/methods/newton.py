@@ -13,7 +13,7 @@ are solved with a factor of Q_CC (closed_sets.py), in the sparse form with one o
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from solvers.algorithms.newton_sweeps import Sweeps
+from solvers.algorithms.newton_sweeps import MAX_SWEEPS, Sweeps
 from solvers.base import Answer, Batch, LoadCase, Problem
 from solvers.kkt import with_x
 from solvers.method import Method, State
@@ -44,7 +44,8 @@ class ActiveSetNewton(Method):
     forms = ("dual", "sparse")
 
     def state(self, problem: Problem) -> _State:
-        return _State(problem=problem, sweeps=Sweeps(problem.prepared))
+        sweeps = Sweeps(problem.prepared, most=self.most(MAX_SWEEPS), log=self.log)
+        return _State(problem=problem, sweeps=sweeps)
 
     def batched(self, state: _State | Answer) -> Batch | None:
         return None if isinstance(state, Answer) else state.solve

@@ -34,7 +34,7 @@ class LBfgsB(Method):
             jac=True,
             method="L-BFGS-B",
             bounds=[(0.0, None)] * len(load.p),
-            options={"ftol": 0.0, "gtol": tolerance, "maxiter": LIMIT, "maxfun": LIMIT},
+            options={"ftol": 0.0, "gtol": tolerance, "maxiter": self.most(LIMIT), "maxfun": LIMIT},
         )
         message = str(result.message)
         details = {"products": int(result.nfev), "message": message}

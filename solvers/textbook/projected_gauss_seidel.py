@@ -50,18 +50,19 @@ class ProjectedGaussSeidel(Method):
         lam, y = first_point(ready.dual_start, load)
         products, sweeps = 0, 0
         reached: list[float] = []  # the residual at each check
-        limit = cause = ""
+        limit, cause, most = "", "", self.most(MAX_SWEEPS)
         while True:
             reached.append(kkt_residual(lam, y))
+            self.log(sweeps=sweeps, residual_mm=reached[-1])
             if reached[-1] <= max(tolerance, rounding_of(p, y)):
                 break
-            if sweeps >= MAX_SWEEPS:
-                limit = f"{MAX_SWEEPS} sweeps"
+            if sweeps >= most:
+                limit = f"{most} sweeps"
                 break
             if len(reached) > PATIENCE and not reached[-1] <= SLOWEST * reached[-1 - PATIENCE]:
                 cause = f"{PATIENCE * CHECKED} sweeps did not halve the KKT residual"
                 break
-            for _ in range(min(CHECKED, MAX_SWEEPS - sweeps)):
+            for _ in range(min(CHECKED, most - sweeps)):
                 lam = _sweep(Q, lam, y, self.relaxation)
                 sweeps += 1
             y, products = product(Q, lam) - p, products + 1

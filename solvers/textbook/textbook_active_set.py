@@ -34,16 +34,18 @@ class TextbookActiveSet(Method):
         Q, p = ready.Q, load.p
         closed = p > 0 if ready.start is None else ready.start.lam > 0
         lam, y, wrong, sets = np.zeros_like(p), -p, np.ones_like(closed), 0
-        while wrong.any() and sets < MAX_SETS:
+        most = self.most(MAX_SETS)
+        while wrong.any() and sets < most:
             C = np.flatnonzero(closed)
             lam = np.zeros_like(p)
             lam[C] = sla.cho_solve(sla.cho_factor(Q[np.ix_(C, C)]), p[C])
             y = Q[:, C] @ lam[C] - p
             wrong = np.where(closed, lam < -tolerance, y < -tolerance)
             closed, sets = closed ^ wrong, sets + 1
+            self.log(set=sets, closed=len(C), wrong=wrong.sum())
         if (lam < 0).any():
             lam = np.maximum(lam, 0.0)
             y = Q @ lam - p
         status, residual = kkt_status(Q, p, lam, y, tolerance)
-        limit = f"{MAX_SETS} sets" if wrong.any() else ""
+        limit = f"{most} sets" if wrong.any() else ""
         return dual_answer(status, lam, residual, {}, (sets, None), limit)

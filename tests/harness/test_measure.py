@@ -1,6 +1,7 @@
 """One measurement, whatever its solver does: a status, and no process left."""
 
 import os
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -145,11 +146,20 @@ def test_the_start_does_not_count_against_the_time_limit(folder: Path) -> None:
     assert row["status"] == "solved"
 
 
+def test_what_a_solver_printed_survives_its_end(folder: Path) -> None:
+    """Lines of Python and of C, which are not in their buffers when the process is killed."""
+    row = outcome(folder, "says")
+    assert (row["status"], row["printed"]) == ("crashed", "one\ntwo\n")
+
+
 def test_floods_of_output_are_dropped_but_for_a_tail(folder: Path) -> None:
     row = outcome(folder, "chatter")
     assert row["status"] == "solved"
     assert set(row["stderr"]) == {"e"}
     assert len(row["stderr"]) <= 2000
+    start, left_out, end = re.split(r"\n\[(\d+) bytes left out\]\n", row["printed"])
+    assert (len(start), len(end)) == (2**16, 2**16)
+    assert len(start + end) + int(left_out) == 300 * (2**20 + 2**16)
     assert outcome(folder, "big_details")["details"].keys() == {"dropped"}
 
 

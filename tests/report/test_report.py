@@ -14,6 +14,7 @@ from report.analysis.standings import shown, standings
 from report.document.blocks import Figure
 from report.document.numbers import significant
 from report.results.reader import Results, read
+from report.sections import profile
 from report.sections.speed import contacts
 from report.sections.summary import EACH, PREPARED, advice, explained, summary
 from report.writers.suite_report import write
@@ -56,6 +57,39 @@ def test_standings_of_a_tiny_run(tiny: Path) -> None:
     assert lines["within"].tolist() == [2, 2, 1, 0]
     assert lines.loc["d (dual)", ["outside", "outside_claimed", "worst_error_mm"]].tolist() == [2, 1, 3e-6]
     assert lines.loc["c (dual)", ["no_answer", "no_answer_because"]].tolist() == [1, "1 time limit"]
+
+
+def test_the_shifted_mean_counts_what_is_missing_or_outside_with_its_limit(tiny: Path) -> None:
+    lines = standings(read(tiny).cells).set_index("method")["shifted_mean_s"]
+    # with preparation, plus 1 s: a (2 + 7 + 1)(8 + 1) = 90; b 2 · 37; c 1.1 · 61, late; d 61², outside
+    assert lines.tolist() == pytest.approx([90**0.5 - 1, 74**0.5 - 1, 67.1**0.5 - 1, 60.0])
+
+
+def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_path: Path) -> None:
+    seconds = {"a": (1.0, 2.0, 8.0, 1.0), "b": (3.0, 1.0, 4.0, None)}
+    rows = [
+        row(f"4386/{k}", name, **(times(solve_s=t) if t else no_answer("time_limit")))
+        for name, of in seconds.items()
+        for k, t in enumerate(of)
+    ]
+    section = profile.section(results(tmp_path, rows))
+    assert section is not None
+    (figure,) = section.blocks
+    assert isinstance(figure, Figure)
+    lines = [[*line] for _, *line in figure.data[["method", "ratio", "share"]].itertuples()]
+    a = [["a (dual)", ratio, share] for ratio, share in ((1, 0.25), (1, 0.5), (2, 0.75), (2, 1.0))]
+    assert lines == [*a, *(["b (dual)", ratio, share] for ratio, share in ((1, 0.25), (1, 0.5), (3, 0.75)))]
+    assert profile.section(results(tmp_path / "two", rows[:2])) is None
+
+
+def test_a_log_is_linked_where_it_is_one_of_the_run(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs/a.txt").write_text("iter 1\n")
+    logs = ("logs/a.txt", "logs/none.txt", "logs/../report.md", "javascript:1")
+    write(write_rows(tmp_path, [row(LOW, f"s{k}", log=log) for k, log in enumerate(logs)]))
+    report, page = ((tmp_path / "report" / name).read_text("utf-8") for name in ("report.md", "index.html"))
+    assert [f"[solved](../{log})" in report for log in logs] == [True, False, False, False]
+    assert [f'"{log}"' in page for log in logs] == [True, False, False, False]
 
 
 def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small_problems import make_load, make_strips
+from small_problems import make_load, make_prepared, make_strips
 from solver_forms import IN_HOUSE
 
 from harness.solving.session import SolverSession
@@ -58,3 +58,37 @@ def test_a_limit_that_was_reached_is_said(
     answer = answered(name, "dual", prepared, make_load(3, prepared)[1], **options)
     assert answer.status == "iteration_limit"
     assert cause in answer.details.get("cause", "")
+
+
+THROUGH_QPSOLVERS = ("scs", "qpalm")
+UNPRECONDITIONED = {"preconditioner": "none"}
+SILENT = ("gi", "l-bfgs-b")
+ITERATIVE = [
+    *(
+        "gi",
+        "ipm",
+        "ipm-fast",
+        "mprgp",
+        "newton",
+        "projected-gauss-seidel",
+        "textbook-active-set",
+        "l-bfgs-b",
+    ),
+    *("clarabel", "cvxpy", "osqp", "piqp", "proxqp", "scs", "qpalm"),
+]
+
+
+@pytest.mark.parametrize("name", ITERATIVE)
+def test_a_solver_stops_after_the_iterations_that_are_allowed(
+    name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    prepared = make_strips(400) if name == "newton" else make_prepared(4, 30, 5)
+    solver = make_solver(name, UNPRECONDITIONED if name == "mprgp" else {})
+    vars(solver).update(iteration_limit=1, prints=True)
+    session = SolverSession(solver, in_form(prepared, "dual"), 1e-10)
+    session.open(batched=False)
+    answer = session.next(make_load(5, prepared)[1], None)
+    assert answer.status == ("failed" if name in THROUGH_QPSOLVERS else "iteration_limit")
+    assert answer.iterations == 1
+    assert answer.lam is not None
+    assert bool(capfd.readouterr().out) is (name not in SILENT)
