@@ -98,7 +98,7 @@ def ours_and_others(results: Results) -> pd.DataFrame:
     for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
         own = ways[seconds].where(ours)
         alone = own.where(beside == "").groupby(ways["scene"]).transform("min")
-        times = (ways[seconds] / own.groupby(at).transform("min")).where(~ours | (beside == ""))
+        times = (ways[seconds] / own.groupby(at).transform("min")).where(ways["round"] == "")
         ways = ways.assign(fastest=times * alone)
         fastest = ways.groupby(["n", "scene", "owner"])["fastest"].min().unstack("owner")
         solved = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
