@@ -89,7 +89,8 @@ def _skipped(solution: Solution, built: set[Stage], solver: str | None) -> Itera
             why = f"The answer without contact violates no gap, {closest}"
         yield f"the quadratic program: it was not called for. {why}{instead}"
     if solution.problem.form == "sparse":
-        yield "condensation, dense factors and Q: the sparse model was solved as it is"
+        Q = "" if "Q" in solution.problem.prepared.opened else " and Q"
+        yield f"condensation, dense factors{Q}: the sparse model was solved as it is"
     elif not built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
     elif is_of_plates(solution.problem.scene) and Stage.CONDENSATION not in built:

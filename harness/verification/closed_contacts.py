@@ -1,4 +1,4 @@
-"""Makes the gaps of closed contacts zero: Q_CC dλ = −y_C by M ≈ Q⁻¹, or by a factor of a dense Q_CC."""
+"""Makes the gaps of closed contacts zero: Q_CC dλ = −y_C by M ≈ Q⁻¹, or by a factor of Q_CC."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ MAX_SETS = 10  # contact sets tried with M for one load case
 class ScaledInverse:
     """M ≈ Q⁻¹, None if it cannot be made, and about the diagonal of Q (m,), in units R (m,) of contacts.
 
-    Q : (m, m) where it is dense and has no M.
+    Q : (m, m) where sets are solved with it.
     """
 
     M: BandedInverse | None
@@ -31,7 +31,7 @@ class ScaledInverse:
         with suppress(np.linalg.LinAlgError):  # Q is not positive definite, but for rounding
             if len(R):
                 plain = prepared.approximate_inverse
-                Q = prepared.Q if plain.M is None and prepared.assembly.K.dense else None
+                Q = prepared.Q_of_sets if plain.M is None else None
                 return cls(plain.M, plain.diagonal * R**2, R, Q)
         return cls(None, np.ones(len(R)), R)
 

@@ -22,7 +22,7 @@ matter where λ came from. Refinement of x and λ_C in twice the working precisi
     x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
 
 by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M (closed_contacts.py), or
-with springs at the contacts of C where K is sparse and there is no M (sprung_contacts.py). Load cases
+with springs at the contacts of C where there is neither M nor Q (sprung_contacts.py). Load cases
 are columns; a column is taken out when its bound is small enough.
 """
 
@@ -94,8 +94,9 @@ class Proof:
 
     @cached_property
     def springs(self) -> Springs | None:
-        """K with springs, where K is sparse and there is no M."""
-        sprung = self.inverse.M is None and not self.balanced.assembly.K.dense
+        """K with springs, where K is sparse and there is neither M nor Q."""
+        inverse = self.inverse
+        sprung = inverse.M is None and inverse.Q is None and not self.balanced.assembly.K.dense
         return Springs(self.balanced, self.kappa) if sprung else None
 
     @property

@@ -1,4 +1,4 @@
-"""Makes the gaps of closed contacts zero where there is no M: by K with springs at them.
+"""Makes the gaps of closed contacts zero where there is neither M nor Q: by K with springs at them.
 
 With A_Cᵀdx = s_C, springs of a stiffness ρ at the contacts of C change nothing but the condition (augmented
 Lagrangian; Hestenes, J. Optim. Theory Appl. 4:303–320, 1969):

@@ -1,4 +1,4 @@
-"""Solutions of contact sets with factors of Q_CC: for a dense Q that has no banded inverse.
+"""Solutions of contact sets with factors of Q_CC: for a Q that has no banded inverse.
 
 From a point (λ, y) with y exact, a set C has λ⁺ = λ + dλ with
 

@@ -7,7 +7,7 @@ set C, N the other contacts, y⁺_C = 0 and λ⁺_N = 0, so that
 
 In terms of the change z, rounding shrinks with what is left to correct.
 
-Where there is no M, as K has no band or contacts lie all over an area, the change is
+Where there is neither M nor Q, as K has no band or contacts lie all over an area, the change is
 
     [ K    A_C ] [ dx  ]   [ A_N λ_N ]
     [ A_Cᵀ  0  ] [ dλ_C ] = [ y_C     ]

@@ -101,15 +101,11 @@ class Sweeps:
 
     @cached_property
     def sets(self) -> ClosedSets | ContactSprings:
-        """The replacement of M where there is none."""
-        if self.prepared.assembly.K.dense:
-            return ClosedSets(self.prepared.Q, self.prepared.assembly.contact_nodes)
-        return self.springs
-
-    @cached_property
-    def springs(self) -> ContactSprings:
-        """Factorisations of a sparse K."""
-        return ContactSprings(self.prepared)
+        """The replacement of M where there is none: Q, or factors of K with springs."""
+        Q = self.prepared.Q_of_sets
+        if Q is None:
+            return ContactSprings(self.prepared)
+        return ClosedSets(Q, self.prepared.assembly.contact_nodes)
 
     def __call__(self, loads: Sequence[DualLoadCase], tolerance: float) -> list[Answer]:
         """The answers to several loads, solved together, each from the nearest of the last cases."""
@@ -234,8 +230,8 @@ class Sweeps:
             at = partial(banded_set, case.factor, case.trial)
         order = self.order
         floor = self._floor(case, case.trial)
-        most, dense = int(FIRST_SETS * GROWTH**case.sweeps), self.prepared.assembly.K.dense
-        begins = case.sweeps == (LATE if dense and self.M is None else 0)
+        most = int(FIRST_SETS * GROWTH**case.sweeps)
+        begins = case.sweeps == (LATE if self.M is None and isinstance(self.sets, ClosedSets) else 0)
         result = block_pivoting(at, case.C, self.compliance, floor, most, PATIENCE if begins else None)
         if begins and result.creeps:
             if self.M is None:

@@ -29,7 +29,7 @@ from problems.model.joint_model import JointModel
 from problems.scene_files import read_scene
 from problems.stiffness.dense_block import DenseBlock
 
-N, M = 3000, 40
+N, M = 3000, 400
 NODES = (200, 8)
 SCENE = f"""
 {two_parts(3000.0, 105.0, NODES, "south")}

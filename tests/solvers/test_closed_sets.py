@@ -4,14 +4,21 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from small_problems import by_nnls, definite
 
-from problems.forms.assembly import DualLoadCase
+from harness.solving.session import answer_of
+from harness.verification.reference import proof_of
+from problems.forms.assembly import Assembly, DualLoadCase, LoadCase
 from problems.forms.closed_factor import ClosedFactor
-from problems.forms.prepared import dual_alone
+from problems.forms.prepared import Prepared, dual_alone
+from problems.forms.sprung_stiffness import SprungStiffness
+from problems.ladders.rough import brick_stiffness
+from problems.stiffness.operator import Stiffness
 from solvers.algorithms.block_pivoting import TrialSolution
 from solvers.algorithms.closed_sets import ClosedSets
 from solvers.algorithms.newton_sweeps import Sweeps
+from solvers.registry import make_solver
 
 TOLERANCE = 1e-10
 SIZE = 200
@@ -87,3 +94,30 @@ def test_an_answer_does_not_depend_on_those_before() -> None:
         sweeps.solved(load, TOLERANCE)
     again = sweeps.solved(loads[0], TOLERANCE).trial.lam
     np.testing.assert_array_equal(again, Sweeps(dual_alone(Q)).solved(loads[0], TOLERANCE).trial.lam)
+
+
+def solid_blocks(side: int, thickness: int) -> Assembly:
+    """Two blocks of side² × thickness nodes, held at their backs, that meet on one face; K in one piece."""
+    layer, free = side**2, np.arange(3 * side**2 * (thickness + 1)).reshape(3, -1)[:, side**2 :].T.ravel()
+    K = sp.block_diag([brick_stiffness(thickness + 1, side, side)[free][:, free]] * 2, format="csc")
+    faces = 3 * np.arange((thickness - 1) * layer, thickness * layer) + np.array(
+        [[0], [3 * thickness * layer]]
+    )
+    meeting = sp.csc_array(
+        (np.ones(2 * layer), (faces.ravel(), np.tile(np.arange(layer), 2))), shape=(K.shape[0], layer)
+    )
+    return Assembly(Stiffness.of(K), meeting)
+
+
+def test_solids_that_meet_on_a_face_are_solved_and_proven_with_q(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their K has a band, K with springs between them has none: it is never factored."""
+    monkeypatch.delattr(SprungStiffness, "factor")
+    assembly, random = solid_blocks(8, 4), np.random.default_rng(4)
+    data = Prepared(assembly)
+    load = LoadCase(assembly.A @ random.uniform(0, 1, assembly.m), random.uniform(-0.3, 1.5, assembly.m))
+    answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, TOLERANCE)
+    exact = by_nnls(data.Q, data.with_p([load])[0].p)
+    assert answer.lam is not None
+    assert 10 < np.count_nonzero(exact) < 54
+    np.testing.assert_allclose(answer.lam, exact, atol=1e-9)
+    assert proof_of(data).proven([load], [answer.lam], [answer.x], 1e-12)[0].bound_mm < 1e-12
