@@ -62,15 +62,12 @@ def whole(values: Any, one: int) -> Any:
     return numbers.reshape(np.shape(values))
 
 
-def is_exact(made: ManufacturedProblem, one: int) -> bool:
-    """Kx + Aλ = f, K = Kᵀ, λ ≥ 0, y = g − Aᵀx ≥ 0 and λy = 0; every number is a multiple of 1/one."""
-    K, (A, x, lam, f, g) = (
-        made.assembly.K,
-        (
-            whole(values, one)
-            for values in (made.assembly.A.toarray(), made.x, made.lam, made.load.f, made.load.g)
-        ),
-    )
+def is_exact(made: ManufacturedProblem) -> bool:
+    """Kx + Aλ = f, K = Kᵀ, λ ≥ 0, y = g − Aᵀx ≥ 0 and λy = 0, in whole numbers."""
+    K, others = made.assembly.K, (made.assembly.A.toarray(), made.x, made.lam, made.load.f, made.load.g)
+    numbers = np.concatenate([np.ravel(v) for v in (*K.matrices, *others)])
+    one = 2 ** max(0, 53 - int(np.frexp(numbers[numbers != 0])[1].min()))  # of which all are multiples
+    A, x, lam, f, g = (whole(values, one) for values in others)
     Kx = np.concatenate([whole(M, one) @ x[rows] for M, rows in zip(K.matrices, K.slices, strict=True)])
     y = g * one - A.T @ x
     symmetric = all((M == M.T).all() for M in K.matrices)

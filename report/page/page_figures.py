@@ -43,29 +43,33 @@ def _kept(what: list[str], make: Callable[[], Any]) -> Any:
 
 
 def item(plot: figure, name: str) -> Any:
-    """A figure as JSON for `Bokeh.embed.embed_item`.
+    """A figure as JSON for `Bokeh.embed.embed_item`."""
+    return copies(plot, [name])[0]
 
-    Bokeh numbers its models through the process; here they are numbered anew, behind `name`, which differs
+
+def copies(plot: figure, names: Iterable[str]) -> list[Any]:
+    """The JSON of a figure for each name.
+
+    Bokeh numbers its models through the process; here they are numbered anew, behind a name, which differs
     among the figures of a page, so that equal data give equal pages.
     """
     from bokeh.embed import json_item
 
-    numbers: dict[str, str] = {}
-
-    def renumbered(value: Any) -> Any:
+    def renumbered(value: Any, name: str, numbers: dict[str, str]) -> Any:
         match value:
             case dict():
                 return {
                     key: numbers.setdefault(inner, f"{name}-{len(numbers)}")
                     if key in ("id", "root_id")
-                    else renumbered(inner)
+                    else renumbered(inner, name, numbers)
                     for key, inner in value.items()
                 }
             case list():
-                return [renumbered(inner) for inner in value]
+                return [renumbered(inner, name, numbers) for inner in value]
         return value
 
-    return renumbered(json_item(plot))
+    made = json_item(plot)
+    return [renumbered(made, name, {}) for name in names]
 
 
 def map_figure(names: Iterable[str]) -> figure:

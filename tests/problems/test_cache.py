@@ -24,12 +24,13 @@ SCENE = make_scene(
 )
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
+@pytest.mark.usefixtures("root")
 def test_an_entry_comes_back_memory_mapped_and_read_only() -> None:
     assert storage.load("key") is None
     storage.store("key", ARRAYS, {"n": 3, "text": "é"})
@@ -98,6 +99,7 @@ def test_what_a_killed_writer_leaves_is_not_seen(root: Path, monkeypatch: pytest
     assert storage.load("key") is not None
 
 
+@pytest.mark.usefixtures("root")
 def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
     monkeypatch.setattr(Reporter, "building", lambda self, stage, *rest: made.append(stage))
@@ -144,7 +146,6 @@ def test_a_change_of_the_code_that_builds_changes_the_key(
     monkeypatch.setattr(Path, "read_bytes", with_more("\n# words\n", edited))
     assert build.prepared(scene).key == key
     monkeypatch.undo()
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(storage, "_read", storage._read.__wrapped__)
     monkeypatch.setattr(Path, "read_bytes", with_more("\nMORE = 1\n", edited))
     assert build.prepared(scene).key != key

@@ -65,7 +65,7 @@ def test_there_are_enough_rungs_and_none_twice() -> None:
 
 @pytest.mark.parametrize("name", EXACT)
 def test_the_answer_satisfies_the_optimality_conditions_without_rounding(name: str) -> None:
-    assert is_exact(made_of(name), 2**1200)  # so denormal numbers, too, become whole
+    assert is_exact(made_of(name))
 
 
 @pytest.mark.parametrize("percent", [5, 10, 25, 50, 75, 100])
@@ -181,7 +181,7 @@ SMALL = {
 
 @pytest.mark.parametrize("name", SMALL)
 def test_an_answer_as_of_the_full_size_is_exact(name: str) -> None:
-    assert is_exact(SMALL[name], 2**60)
+    assert is_exact(SMALL[name])
 
 
 def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_of_two() -> None:

@@ -56,28 +56,22 @@ def test_every_kind_has_a_smallest_scene_here() -> None:
     assert set(TABLES) == set(effect_kinds())
 
 
-def test_bits_are_the_same_without_the_other_effects_files(tmp_path: Path) -> None:
-    """Once with every file there, once from a copy without the files that the scene has no need of."""
-    kinds = ["installed_fasteners", "ribs", "rigid_tool", "self_weight", "shims"]
-    scene = scene_of(tmp_path, *kinds)
+def test_a_named_effect_imports_itself_alone_and_needs_no_other_file(tmp_path: Path) -> None:
+    """Each kind, and some together: their bits are the same from a copy without the other effects' files."""
+    some = ["installed_fasteners", "ribs", "rigid_tool", "self_weight", "shims"]
+    wanted = [[kind] for kind in sorted(set(TABLES) - {"support_shift"})] + [some]
+    scenes = [scene_of(tmp_path, *kinds) for kinds in wanted]
+    found = imported(scenes, tmp_path / "all")
+    effects = [[m for m in sorted(modules) if m.startswith("problems.effects.")] for modules in found]
+    assert effects == [[f"problems.effects.{kind}" for kind in kinds] for kinds in wanted]
     shutil.copytree(ROOT / "problems", tmp_path / "problems", ignore=shutil.ignore_patterns("__pycache__"))
-    for kind in set(effect_kinds()) - set(kinds):
+    for kind in set(effect_kinds()) - set(some):
         (tmp_path / "problems" / "effects" / f"{kind}.py").unlink()
-    arrays = scene.with_suffix(".toml.npz")
-    (everything,), bits = imported([scene], tmp_path / "all"), arrays.read_bytes()
-    (bare,) = imported([scene], tmp_path / "bare", tmp_path)
-    assert bare == everything
+    arrays = scenes[-1].with_suffix(".toml.npz")
+    bits = arrays.read_bytes()
+    (bare,) = imported(scenes[-1:], tmp_path / "bare", tmp_path)
+    assert bare == found[-1]
     assert arrays.read_bytes() == bits
-    assert {m.removeprefix("problems.effects.") for m in bare if m.startswith("problems.effects.")} == set(
-        kinds
-    )
-
-
-def test_a_named_effect_imports_itself_alone(tmp_path: Path) -> None:
-    kinds = sorted(set(TABLES) - {"support_shift"})
-    found = imported([scene_of(tmp_path, kind) for kind in kinds], tmp_path / "cache")
-    effects = [[m for m in modules if m.startswith("problems.effects.")] for modules in found]
-    assert effects == [[f"problems.effects.{kind}"] for kind in kinds]
 
 
 def test_keys_of_packaged_scenes_are_made_of_these_names_alone() -> None:
