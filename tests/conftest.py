@@ -33,6 +33,13 @@ def _forked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
         fork_measuring_processes(monkeypatch)
 
 
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Answers and series are written without them: they take longer than all the rest."""
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
+
+
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished run of the tiny joint, two rows of the plug-in `exact`, which nobody may change."""

@@ -72,17 +72,20 @@ class Positions(ContactEffect, ForceEffect):
         if not self.pattern.on_nodes:
             return places
         nodes = joint.nodes_of(joint.names[0])
-        return np.array([nodes[((nodes - place) ** 2).sum(axis=1).argmin()] for place in places])
+        at_x, at_y = np.ascontiguousarray(nodes.T)
+        return nodes[[((at_x - x) ** 2 + (at_y - y) ** 2).argmin() for x, y in places]]
 
     def element_count(self, joint: AnyJoint) -> int:
-        return len(self.marks(joint))
+        return self.pattern.columns * self.pattern.rows if self.pattern else len(self.points)
 
     def only(self, elements: Sequence[int], joint: AnyJoint) -> Self:
-        marks = self.marks(joint)
-        update: dict[str, object] = {"points": tuple(map(tuple, marks[elements].tolist())), "pattern": None}
+        if len(elements) == self.element_count(joint):
+            return self
+        places = tuple(map(tuple, self.marks(joint)[elements].tolist()))
+        update: dict[str, object] = {"points": places, "pattern": None}
         if isinstance(preload := getattr(self, "preload", None), tuple):
             update["preload"] = tuple(preload[k] for k in elements)
-        return self if len(elements) == len(marks) else self.model_copy(update=update)
+        return self.model_copy(update=update)
 
     def unusual(self, joint: AnyJoint) -> Faults:
         thinnest = joint.thinnest

@@ -113,8 +113,8 @@ def study(directory: Path) -> Study:
 
 
 def _records(frame: pd.DataFrame) -> list[Row]:
-    plain = frame.astype(object).where(frame.notna(), None)
-    return plain.to_dict("records")  # type: ignore[return-value]
+    rows = frame.astype(object).to_dict("records")
+    return [{str(key): None if value != value else value for key, value in row.items()} for row in rows]
 
 
 def _method(row: Row) -> str:

@@ -89,6 +89,7 @@ def test_small_integers_are_refused_exactly_where_their_rank_says_so() -> None:
     assert 40 < refused < 160
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(
     ("words", "refused"),
     [

@@ -19,7 +19,7 @@ from problems.random_scenes import KINDS, MEANS, ROWS, SIZES, drawn_names
 from problems.scene_files import read_scene
 from studies.publish import PUBLISHED
 
-DRAWS = [f"{DRAWN}{n}/{k}" for k in range(167) for n in SIZES]  # 501
+DRAWS = [f"{DRAWN}{n}/{k}" for k in range(80) for n in SIZES]  # 240
 
 
 def drawn_scene(name: str) -> JointScene:

@@ -237,6 +237,7 @@ def test_the_expected_error_is_that_of_rounding() -> None:
     assert np.median(errors) / 5 < expected < 5 * np.median(errors)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     scene = read_scene("gallery/sheet-over-former")
     data = matrices(prepared(scene), load_case(scene))
@@ -255,6 +256,7 @@ def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     assert "all digits of double precision" in shown.getvalue()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_digits_of_many_separate_unknowns_take_no_reference_and_no_dense_matrix(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

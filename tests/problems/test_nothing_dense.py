@@ -25,6 +25,7 @@ from problems.forms import FORMS
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from problems.input import matrix_files
+from problems.input.user_matrices import read_matrices
 from problems.model.joint_model import JointModel
 from problems.scene_files import read_scene
 from problems.stiffness.dense_block import DenseBlock
@@ -91,12 +92,18 @@ def answer(folder: Path) -> Vector:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scipy_npz", [False, True])
-def test_import_validate_and_solve_make_nothing_dense(scipy_npz: bool, tmp_path: Path) -> None:
-    out = tmp_path / "mine.npz"
-    code, said = run("import", *files(tmp_path, scipy_npz=scipy_npz), "--out", str(out))
-    assert (code, "positive definite, cond(K) = about" in said) == (0, True), said
-    assert out.stat().st_size < 8 * N**2 / 20
+@pytest.mark.usefixtures("without_pictures")
+def test_import_validate_and_solve_make_nothing_dense(tmp_path: Path) -> None:
+    """Of Matrix Market files, and of SciPy's, which give the same."""
+    out, read = tmp_path / "mine.npz", []
+    for scipy_npz in (False, True):
+        code, said = run("import", *files(tmp_path, scipy_npz=scipy_npz), "--out", str(out))
+        assert (code, "positive definite, cond(K) = about" in said) == (0, True), said
+        assert out.stat().st_size < 8 * N**2 / 20
+        read.append(read_matrices({"problem": out}))
+    (one, load), (other, other_load) = read
+    assert (one.K.matrix != other.K.matrix).nnz == (one.A != other.A).nnz == 0
+    np.testing.assert_array_equal(np.append(load.f, load.g), np.append(other_load.f, other_load.g))
     code, said = run("validate", str(out))
     assert (code, "Sparse form by default" in said) == (0, True), said
     code, said = run("solve", str(out), "--out", str(tmp_path / "answer"))

@@ -152,6 +152,7 @@ def test_a_motion_without_energy_is_refused() -> None:
         condense(K, [np.array([0, 1]), np.array([2, 3])], np.array([False, False, False, True]))
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("form", ["dual", "primal", "sparse"])
 def test_one_solve_makes_one_model_and_reads_its_scene_once(
     form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -169,7 +170,6 @@ def test_one_solve_makes_one_model_and_reads_its_scene_once(
 
     monkeypatch.setattr(JointModel, "of", classmethod(counted))
     monkeypatch.setattr(reading, "read_toml", counted_read)
-    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     path = scene_of(tmp_path, "initial_gap", "pressure", "self_weight")
     done = harness("solve", path, "--form", form, "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output

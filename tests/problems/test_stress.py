@@ -26,13 +26,7 @@ from problems.scene_files import SCENES, read_scene
 from report.figures.answer_maps import answer_figures
 
 NOWHERE = np.zeros((0, 2))
-FIGURES = "report.writers.answer_report.answer_figures"
 E, NU, T, SIDE, Q = 70e3, 0.3, 2.0, 100.0, 0.01
-
-
-@pytest.fixture(autouse=True)
-def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FIGURES, lambda *_: {})
 
 
 def square(elements: int) -> Plate:
@@ -202,6 +196,7 @@ def test_superelements_without_recovery_have_none() -> None:
         stresses_of(read_scene("drawn/superelements/0"), np.zeros(1))
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(("allowed", "code", "word"), [(50, 0, "PASS"), (0.5, 4, "FAIL"), (0, 2, "positive")])
 def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str) -> None:
     done = harness("solve", "gallery/heavy-sheet-on-tool", "--allow-stress", allowed, "--out", tmp_path / "a")
@@ -216,7 +211,8 @@ def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str)
 
 def test_every_stress_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its map, too; the other pictures of the answer are not drawn into files."""
-    monkeypatch.setattr(FIGURES, lambda *answer: {"stress": answer_figures(*answer)["stress"]})
+    name = "report.writers.answer_report.answer_figures"
+    monkeypatch.setattr(name, lambda *answer: {"stress": answer_figures(*answer)["stress"]})
     scene, out = "gallery/installed-fasteners", tmp_path / "a"
     limits = ("--allow-stress", 1e3, "--allow-gap", 1e-4)
     done = harness("solve", scene, *limits, "--out", out)
@@ -239,6 +235,7 @@ def test_every_stress_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert (out / "stress.png").stat().st_size > 0
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_scene_asks_for_stresses(tmp_path: Path) -> None:
     text = read_text(SCENES / "gallery/heavy-sheet-on-tool.toml", "file", 1, strict=True)
     (tmp_path / "asked.toml").write_text(f"{text}\n[output]\nstress = true\n", "utf-8")

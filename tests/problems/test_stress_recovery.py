@@ -223,6 +223,7 @@ points = [[10.0, 5.0]]
 """
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(("allowed", "code", "word"), [(1e4, 0, "PASS"), (1e-4, 4, "FAIL")])
 def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str) -> None:
     S = np.vstack([GOOD[:3] * [[1], [0], [0]], GOOD[:3] * [[3], [0], [0]]])

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from problems.random_scenes import EXAMPLES
+from problems.random_scenes import EXAMPLES, SUPERELEMENTS
 from problems.scene_files import read_scene, scene_names, scene_of
 
 PART = {"name": "a", "thickness": 3.0, "north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
@@ -14,6 +14,7 @@ JOINT = {
 }
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
+DRAWN = [name for name in EXAMPLES if SUPERELEMENTS not in name]  # those: test_random_superelements.py
 
 
 def unusual(*effects: dict[str, Any], **joint: Any) -> list[str]:
@@ -52,6 +53,6 @@ def test_what_is_usual_is_not_said() -> None:
     assert unusual(gap, FASTENER | {"preload": 3600.0}) == []
 
 
-@pytest.mark.parametrize("name", [*GALLERY, *EXAMPLES])
+@pytest.mark.parametrize("name", [*GALLERY, *DRAWN])
 def test_nothing_is_unusual_about_a_scene_of_the_gallery_or_a_drawn_one(name: str) -> None:
     assert read_scene(name).unusual == []

@@ -72,8 +72,8 @@ def test_nothing_is_cut_or_covered(width: float, height: float, parts: int, kind
     assert list(drawn) == ["gap", "forces", "displacement"]
     for figure in drawn.values():
         with style.applied():
+            figure.draw_without_rendering()
             renderer = FigureCanvasAgg(figure).get_renderer()
-            figure.draw(renderer)
             whole = figure.get_tightbbox(renderer)
             texts = [text.get_window_extent(renderer) for text in texts_of(figure)]
             frames = [axes.get_window_extent(renderer) for axes in figure.axes]

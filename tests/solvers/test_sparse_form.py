@@ -187,8 +187,8 @@ def test_each_preconditioner_cold_and_warm(kind: str) -> None:
     assert warm.details["products"] <= again.details["products"]
 
 
-def test_the_papers_smallest_joint_in_a_few_products() -> None:
-    scene = read_scene("4386/1471")
+def test_the_smallest_joint_of_the_scaling_in_a_few_products() -> None:
+    scene = read_scene("scaling/1170")
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = session_of("mprgp", data).next(load, None)
     assert answer.status == "solved"
