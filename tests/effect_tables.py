@@ -13,6 +13,7 @@ TABLES = {
     "installed_fasteners": "points = [[10.0, 10.0]]",
     "local_thickness": 'part = "a"\nthickness = 3.0\nx = [0.0, 50.0]\ny = [0.0, 50.0]',
     "measured_gap": "points = [[0.0, 0.0, 0.1], [100.0, 0.0, 0.2], [0.0, 50.0, 0.3]]",
+    "part_position": 'part = "a"\nshift = 0.1\nslope_x = 1e-3\nslope_y = -2e-3',
     "pressure": 'part = "a"\nvalue = 1e-3',
     "ribs": 'part = "a"\nlines = [20.0]\nI = 100.0',
     "rigid_tool": 'part = "b"\ndistance = 0.3',

@@ -11,6 +11,7 @@ from problems.effects.clamps import Clamps
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import SHIFT, InitialGap, square_root
 from problems.effects.measured_gap import MeasuredGap
+from problems.effects.part_position import PartPosition
 from problems.effects.pressure import Pressure
 from problems.effects.rigid_tool import RigidTool
 from problems.effects.shims import Shims
@@ -41,6 +42,15 @@ def test_a_fastener_acts_where_it_is(points: list[tuple[float, float]]) -> None:
     np.testing.assert_allclose(on_a @ fields, 700 * there, rtol=1e-12, atol=700 * 400 * 120 * 2e-12)
     far = (abs(JOINT.nodes[:, None] - at) > (50.0, 30.0)).any(axis=2).all(axis=1)
     assert not on_a[far].any()  # on the nodes of its element alone
+
+
+def test_a_part_between_two_opens_one_gap_and_closes_the_other() -> None:
+    """And parts that are all off by the same have the gaps that they would have in their places."""
+    table = {"kind": "part_position", "shift": 0.2, "slope_y": 1e-3}
+    a, b, c = (PartPosition.model_validate(table | {"part": name}).gap(THREE) for name in "abc")
+    r = 0.2 + 1e-3 * (THREE.nodes[:, 1] - 60.0)
+    np.testing.assert_allclose(b, [*r, *-r], rtol=1e-14)
+    np.testing.assert_allclose(a + b + c, np.zeros(90), atol=1e-15)
 
 
 def patterned(**pattern: float) -> Fasteners:

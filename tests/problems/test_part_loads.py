@@ -11,7 +11,9 @@ from small_joints import make_joint, make_scene
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.local_thickness import LocalThickness
+from problems.effects.part_position import PartPosition
 from problems.effects.self_weight import SelfWeight
+from problems.effects.support_shift import SupportShift
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
 from problems.forms.prepared import Prepared
@@ -49,6 +51,18 @@ def strip(*effects: Effect) -> NDArray[np.float64]:
 
 def test_the_examples_for_authors_of_effects_run() -> None:
     assert [doctest.testmod(module) for module in (effect, part)] == [(0, 2), (0, 6)]
+
+
+def test_a_part_off_its_place_is_a_part_on_shifted_supports() -> None:
+    """Three supports shifted to a plane move the part as a rigid body: g falls by where it now is."""
+    off = PartPosition(kind="part_position", part="a", shift=0.3, slope_x=1e-3, slope_y=-2e-3)
+    heights = [0.3 + 1e-3 * (x - 200) - 2e-3 * (y - 60) for x, y in THREE]
+    shifts = [
+        SupportShift(kind="support_shift", part="a", points=(point,), shift=height)
+        for point, height in zip(THREE, heights, strict=True)
+    ]
+    x, _ = solved(FREE_JOINT, HELD, *shifts)
+    np.testing.assert_allclose(off.gap(FREE_JOINT), -x, rtol=0, atol=1e-9)
 
 
 def test_a_heavy_cantilever() -> None:
