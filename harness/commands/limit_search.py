@@ -4,9 +4,10 @@ Each value v of an even grid is a series of the same N load cases: case k depend
 k(v) of them the gap is proven to be within the limit. If one end of the range keeps it in a share s of the
 cases and the other does not, bisection finds neighbours v, v' of the grid with k(v) ≥ sN > k(v').
 
-Bisection for the least k whose interval of Clopper and Pearson begins at s or above, and for the least whose
-interval reaches s, bounds the value with 95 % confidence, if the share changes one way. Fresh cases, those of
-the next seed, tell the share at v; rows of a table chose it themselves.
+Bisection for the least k whose interval begins at s or above, and for the least whose interval reaches s,
+bounds the value with 95 % confidence, if the share changes one way. Fresh cases, those of the next seed, tell
+the share at v: if their interval is below s, v moves half-way to the end where the share is surely kept, and
+so on. Rows of a table chose v themselves.
 """
 
 from bisect import bisect_left
@@ -48,7 +49,8 @@ class Tolerance:
     Parameters
     ----------
     value : float, optional
-        The largest or least value that keeps the share; None if both ends of the range do, or neither.
+        The largest or least value that keeps the share, also by fresh cases; None if both ends of the range
+        do, or neither.
     interval : tuple of (float, float)
         Where it is with 95 % confidence; infinite where that is beyond the range.
     passed : bool
@@ -157,35 +159,45 @@ def tolerance(
         both = [(row.get("max_gap_mm"), row.get("gap_error_mm")) for row in rows]
         return np.array([inf if gap is None or e is None else gap + e for gap, e in both])
 
-    bounds = cache(upper_bounds)
+    bounds, shares = cache(upper_bounds), list[dict[str, float]]()
 
-    def kept(value: float) -> int:
+    @cache
+    def kept(value: float, seed: int | None = None) -> int:
         """In how many cases a value keeps the limit."""
-        count = int((bounds(value) <= allow_gap_mm).sum())
-        reporter.say(
-            f"{name} = {value:g}: within {allow_gap_mm:g} mm in {count} of {len(bounds(value))} cases"
-        )
-        return count
+        keeps, which = bounds(value, seed) <= allow_gap_mm, "fresh cases" if seed else "cases"
+        (low, high), k = share_interval(int(keeps.sum()), len(keeps)), int(keeps.sum())
+        figures = {"value": value, "cases": len(keeps), "kept": k, "share": k / len(keeps)}
+        shares.append(figures | {"low": low, "high": high, "fresh": bool(seed)})
+        reporter.say(f"{name} = {value:g}: within {allow_gap_mm:g} mm in {k} of {len(keeps)} {which}")
+        return k
 
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
     with records.locked(directory, (), other=SERIES), shared(scheduler, console_of(reporter)) as address:
-        count = len(bounds(values[0]))
-        if np.array_equal(bounds(values[0]), bounds(values[-1])):
+        first, last = (bounds(value, None) for value in (values[0], values[-1]))
+        if np.array_equal(first, last):
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
-        outcome = searched(cache(kept), values, share, count)
+        outcome, count = searched(kept, values, share, len(first)), len(first)
         limit = f"{allow_gap_mm:g} mm in {100 * share:g} % of the joints"
         said = [outcome.sentences[0].format(key=name, limit=limit)]
-        if outcome.value is not None and not cases.gaps:
-            fresh = bounds(outcome.value, (cases.seed or 0) + 1) <= allow_gap_mm
-            least, most = share_interval(int(fresh.sum()), count)
+        value, rising = outcome.value, kept(values[0]) < kept(values[-1])
+        while value is not None and not cases.gaps:
+            fresh = kept(value, (cases.seed or 0) + 1)
+            least, most = share_interval(fresh, count)
             said.append(
-                f"At {outcome.value:g} it is kept in {fresh.sum()} of {count} fresh cases, proven: the share "
-                f"of joints is between {least:.2%} and {most:.2%}, with {CONFIDENCE:.0%} confidence."
+                f"At {value:g} it is kept in {fresh} of {count} fresh cases, proven: the share of joints is "
+                f"between {least:.2%} and {most:.2%}, with {CONFIDENCE:.0%} confidence."
             )
-            outcome = replace(outcome, passed=most >= share)
+            outcome = replace(outcome, value=value, passed=most >= share)
+            safe = min(max(outcome.interval[rising], values[0]), values[-1])
+            if outcome.passed or value == safe:
+                break
+            value = values[(values.index(value) + values.index(safe) + rising) // 2]
         outcome = replace(outcome, sentences=tuple(said))
         asked = {"find": find, "allowed_mm": allow_gap_mm, "share": share, "cases": count}
         records.replace_object(directory / RECORD, asked | asdict(outcome))
+        from report.writers.tolerance_report import write  # slow to import: not before the first row
+
+        write(directory, f"{name} in {read.name}", share, said, shares)
     return outcome
 
 

@@ -23,11 +23,11 @@ from math import ceil, floor, log, log10
 
 from harness.placement.candidates import Plan
 from harness.placement.plan_search import PlanSearch, Step
+from harness.scene.allowed_gap import CONFIDENCE, share_interval
 from problems.errors import InputError
 from report.document.numbers import counted
 
 ALPHA = 0.05
-CONFIDENCE = 1 - ALPHA
 POWER = 0.8
 SHARE = 0.95
 ROUNDS = 4
@@ -129,17 +129,15 @@ class Sample:
         cls, plan: Plan, search: PlanSearch, goal: Goal, cases: Cases, fresh: slice, alpha: float
     ) -> "Sample":
         """fresh : which of the cases' numbers."""
-        from scipy.stats import binomtest
-
         numbers = cases.numbers[fresh]
         count = len(numbers)
         step = search.among(numbers, goal.failing(count, alpha)).whole(plan, "fresh cases")
         limit = step.gap_mm if goal.limit_mm is None else goal.limit_mm
         kept = sum(gap <= limit for gap in step.outcome.largest)
-        low, high = binomtest(kept, count).proportion_ci(1 - alpha, "exact")
+        interval = share_interval(kept, count, 1 - alpha, "exact")
         name = "held-back row" if cases.table else "fresh case"
         name = f"{name}s" if count > 1 else name
-        return cls(step, numbers, name, kept, (float(low), float(high)), search.item)
+        return cls(step, numbers, name, kept, interval, search.item)
 
     def sentence(self, goal: Goal, which: str = "") -> str:
         """3 fasteners keep 0.12 mm in 96.7 % of 300 fresh cases (95 % interval 94.0 to 98.4 %)"""

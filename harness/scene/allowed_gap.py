@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from report.results.series_results import Series
 
 CHECK = "allowed_gap"  # in the facts of a series
-CONFIDENCE = 0.95  # of the interval of Clopper and Pearson for a share
+CONFIDENCE = 0.95  # of the interval for a share
 ROUNDING = 2.0**-24
 
 
@@ -54,13 +54,15 @@ def larger(allowed_mm: float, gap: Vector, e: Vector) -> tuple[Mask, Mask]:
     return certain, ~told | (~certain & (gap + e > allowed_mm))
 
 
-def share_interval(kept: int, count: int) -> tuple[float, float]:
-    """The interval of Clopper and Pearson for the share of all cases that `kept` of `count` cases show."""
-    from scipy.special import betaincinv  # slow to import: not before the first row
+def share_interval(
+    kept: int, count: int, confidence: float = CONFIDENCE, method: str = "wilson"
+) -> tuple[float, float]:
+    """The interval for the share of all cases that `kept` of `count` cases show. method : of scipy's
+    `proportion_ci`; "exact" never covers less than the confidence, "wilson" about as much.
+    """
+    from scipy.stats import binomtest  # slow to import: not before the first row
 
-    half = (1 - CONFIDENCE) / 2
-    low = betaincinv(kept, count - kept + 1, half) if kept else 0.0
-    high = betaincinv(kept + 1, count - kept, 1 - half) if kept < count else 1.0
+    low, high = binomtest(kept, count).proportion_ci(confidence, method)
     return float(low), float(high)
 
 

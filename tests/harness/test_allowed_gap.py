@@ -13,7 +13,7 @@ import pytest
 import scipy.sparse as sp
 from commands import harness
 from sample_size import draws
-from scipy.stats import beta
+from scipy.stats import binomtest
 from small_problems import solve_by_nnls
 from strip_scene import write_strip
 
@@ -164,7 +164,7 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     done = harness(*command, "--allow-gap", allowed, "--out", tmp_path)
     assert done.exit_code == 4, done.output
     assert f"in 5 of {CASES} cases" in done.stdout
-    low, high = beta.ppf(0.025, CASES - 5, 6), beta.ppf(0.975, CASES - 4, 5)
+    low, high = binomtest(CASES - 5, CASES).proportion_ci(0.95, "wilson")
     assert f"Surely within {allowed:g} mm: {CASES - 5} of {CASES} cases" in done.stdout
     assert f"between {low:.2%} and {high:.2%}" in done.stdout
     assert f"at {larger.any(axis=0).sum()} of {gaps.shape[1]} contacts" in done.stdout

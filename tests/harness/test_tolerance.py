@@ -8,11 +8,13 @@ from math import inf
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from commands import harness
-from scipy.stats import beta, binom, binomtest
+from scipy.stats import binom, binomtest, norm
 from strip_scene import write_strip
 
+from harness.commands import limit_search
 from harness.commands.limit_search import searched
 from harness.results import series_file
 from harness.scene.allowed_gap import share_interval
@@ -78,7 +80,7 @@ def test_the_value_is_that_of_a_grid(tmp_path: Path, key: str, low: float, high:
         for name, old in rows.items():
             assert ([*series_file.rows(out / name)] == old) == (name != f"{high:g}")
     else:
-        bounds = [beta.ppf(0.025, k, CASES - k + 1) if k else 0.0 for k in kept]
+        bounds = [binomtest(int(k), CASES).proportion_ci(0.95, "wilson").low for k in kept]
         sure = [value for value, bound in zip(values, bounds, strict=True) if bound >= 0.7]
         assert answer["interval"][0] == max(sure)
 
@@ -151,12 +153,34 @@ def test_bisection_finds_the_limit_and_its_interval() -> None:
         assert len(set(asked)) <= 2 + 3 * np.ceil(np.log2(size + 1))
 
 
-@pytest.mark.parametrize(("count", "share"), [(100, 0.9), (200, 0.95), (300, 0.5)])
-def test_the_interval_covers_the_share_in_95_percent(count: int, share: float) -> None:
-    """The exact probability: at least 95 %, at most 97 %."""
-    intervals = [share_interval(kept, count) for kept in range(count + 1)]
-    for kept in (0, count // 3, count):
-        known = tuple(binomtest(kept, count).proportion_ci(0.95, "exact"))
-        np.testing.assert_allclose(intervals[kept], known, rtol=1e-9)
-    covers = np.array([low <= share <= high for low, high in intervals])
-    assert 0.95 <= binom.pmf(np.flatnonzero(covers), count, share).sum() <= 0.97
+@pytest.mark.parametrize(("count", "share"), [(400, 0.95), (100, 0.9), (100, 0.95), (200, 0.95), (200, 0.99)])
+def test_the_interval_covers_the_share_in_about_95_percent(count: int, share: float) -> None:
+    """The exact probability; at its ends (k/n − s)² = z² s (1 − s)/n (Wilson, JASA 22:209–212, 1927)."""
+    intervals = np.array([share_interval(kept, count) for kept in range(count + 1)])
+    away = (np.arange(count + 1)[:, None] / count - intervals) ** 2
+    np.testing.assert_allclose(away, norm.ppf(0.975) ** 2 * intervals * (1 - intervals) / count, atol=1e-12)
+    covers = (intervals[:, 0] <= share) & (share <= intervals[:, 1])
+    assert 0.93 <= binom.pmf(np.flatnonzero(covers), count, share).sum() <= 0.97
+
+
+def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Half-way to the end of its interval where the share is surely kept, until they do not."""
+    count = 100
+
+    def rows(folder: Path) -> list[dict[str, float]]:
+        value = float(folder.name.removesuffix("-fresh"))
+        wrong = count * value * (1.5 if folder.name.endswith("-fresh") else 1.0)
+        return [{"case": k, "max_gap_mm": float(k < wrong), "gap_error_mm": 0.0} for k in range(count)]
+
+    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
+    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": count})
+    monkeypatch.setattr(series_file, "rows", rows)
+    found = tolerance(write_strip(tmp_path), tmp_path / "out", f"{SD}=0.01:0.61", 0.5, 0.7, 1 / 60)
+    assert found.interval == (0.21, 0.39)
+    assert [text.split()[1] for text in found.sentences[1:]] == ["0.3", "0.25"]
+    assert (found.value, found.passed) == (0.25, True)
+    table = pd.read_csv(tmp_path / "out/shares.csv")
+    assert table[table["fresh"]]["kept"].tolist() == [62, 55]
+    ends = [share_interval(kept, count) for kept in table["kept"]]
+    np.testing.assert_allclose(table[["low", "high"]], ends, rtol=1e-12)
+    assert (tmp_path / "out/shares.png").stat().st_size > 1000
