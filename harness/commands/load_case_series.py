@@ -15,6 +15,7 @@ from harness.results.provenance import fingerprints
 from harness.results.records import Row, to_line
 from harness.results.schema import SERIES
 from harness.scene.allowed_gap import check_series, refuse_unusable
+from harness.series.derivatives import derivatives
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
 from harness.series.session import Job, SeriesOptions
@@ -138,13 +139,17 @@ def run_series(
     refuse_inputs([directory / SERIES], inputs)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
     wanted = options.form or (earlier if earlier in made.forms else None)
-    if read.stages:
-        _refuse_with_stages(read, (*sweep, *cases.random), options.plugin)
+    alien = [*sweep, *cases.random, *([str(options.plugin)] if options.plugin else [])]
+    if read.stages and alien:
+        where = "--sweep, --random, --plugin"
+        raise InputError.one(where, "given", ", ".join(alien), f"left out: {read.name} has stages")
     count = swept(read, sweep).count if sweep else cases.count or RANDOM * (cases.contributors or 1)
     choice = chosen_form(read, made.forms, wanted, count)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
-    chosen: LoadCases = swept(read, sweep, choice.form) if sweep else cases.of(last_scene(read), choice.form)
+    chosen: LoadCases = (
+        swept(read, sweep, choice.form) if sweep else cases.of(last_scene(read), choice.form, stiffness=True)
+    )
     for sentence in (*read.unusual, *chosen.notes):
         reporter.say(sentence)
     threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
@@ -157,18 +162,10 @@ def run_series(
         verdict = check_series(directory, allow_gap_mm)
     path = None
     if report and (written := series_file.read_facts(directory)):
-        series_file.write_fact(directory, "series", to_line(written | {"inputs": fingerprints(inputs)}))
+        more: dict[str, Any] = {"inputs": fingerprints(inputs)}
+        more |= {"derivatives": derivatives(job)} if cases.contributors and code == DONE else {}
+        series_file.write_fact(directory, "series", to_line(written | more))
         from report.writers.series_report import write  # slow to import: not before the first row
 
         path = write(directory)
     return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], path)
-
-
-def _refuse_with_stages(scene: Scene, keys: Sequence[str], plugin: Path | None) -> None:
-    """Raise InputError for what does not go through stages."""
-    where = "--sweep, --random"
-    faults = [Fault(where, "key", one, f"left out: {scene.name} has stages") for one in keys]
-    if plugin:
-        faults.append(Fault("--plugin", "plugin", str(plugin), f"left out: {scene.name} has stages"))
-    if faults:
-        raise InputError(faults)

@@ -14,11 +14,11 @@ from harness.results.provenance import fingerprints, resident_mib, stamp
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, Vector
+from problems.model.fastener_forces import fastener_forces
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.reporter import Stage
 
-from .fastener_forces import fastener_forces
 from .solution import Solution
 from .stages import StageAnswer
 from .validate import digits_sentence

@@ -6,9 +6,8 @@ import numpy as np
 
 from harness.verification.judge import Judgement
 from problems.forms.assembly import Vector
+from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
-
-from .fastener_forces import fastener_forces
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,8 @@ class GapCases:
     options : TableOptions, optional
         Headings of the scan's columns x, y and gap, and marks of missing gaps.
     random : tuple of str, optional
-        KEY=DISTRIBUTION, keys of the scene that are random, as "fasteners.preload=each normal(1000, 100)".
+        KEY=DISTRIBUTION, keys of the scene that are random, as "fasteners.preload=each normal(1000, 100)",
+        in a series also of K, as "ribs.I=8 of normal(2000, 100)".
     contributors : int, optional
         Number N of base points, a power of 2: the cases are the N (d + 2) that show what d inputs contribute.
     scans : str, optional
@@ -101,8 +102,11 @@ class GapCases:
         random = any(gap.random for gap in scene.effects_of(InitialGap))
         return replace(self, options=AS_NAMED) == DEFAULT and not random
 
-    def of(self, scene: Scene, form: Form) -> LoadCases:
-        """The load cases of a scene. Raises InputError, as `measured_gaps` and `random_gaps` do."""
+    def of(self, scene: Scene, form: Form, stiffness: bool = False) -> LoadCases:
+        """The load cases of a scene. stiffness : whether keys may change K.
+
+        Raises InputError, as `measured_gaps` and `random_gaps` do.
+        """
         if self.gaps:
             return measured_gaps(scene, self.gaps, self.count, form, self.options)
         if self.scans:
@@ -115,7 +119,7 @@ class GapCases:
             gaps = random_gaps(scene, count, seed, *law, form, self.around, self.options)
         if gaps and not self.random:
             return gaps
-        return random_inputs(scene, self.random, form, gaps, count, seed, self.contributors)
+        return random_inputs(scene, self.random, form, gaps, count, seed, self.contributors, stiffness)
 
 
 DEFAULT = GapCases()

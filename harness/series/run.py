@@ -5,14 +5,18 @@ The same command resumes the series that a directory holds; another series is re
 
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from harness.measurement.scheduler import shared
 from harness.results import records, series_file
 from harness.results.provenance import installed_version, machine
 from harness.results.records import Row, to_line
@@ -22,6 +26,7 @@ from harness.verification.reference import UNPROVEN
 from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.load_cases import LoadCases
+from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from report.document.numbers import counted
 
@@ -43,12 +48,16 @@ def run(
     with records.locked(directory, (), other=records.MEASUREMENTS):
         open_series(directory, identity(job) | facts, metadata(job))
         done = solved(directory, job.cases)
-        remaining = np.flatnonzero(~done).tolist()
+        remaining = sorted(np.flatnonzero(~done).tolist(), key=job.cases.stiffness_of)
         cases, there = counted(len(done), "case"), len(done) - len(remaining)
         console.print(f"{job.scene.name}: {cases}, {there} already in {directory}")
-        if remaining:
-            with results_of(job, remaining, scheduler, console) as results:
-                solve_remaining(job, len(remaining), results, directory, console)
+        with shared(scheduler if remaining else None, console) as address:
+            for _, some in groupby(remaining, job.cases.stiffness_of):
+                numbers = list(some)
+                one_K = job.cases.of_stiffness(numbers[0], job.scene)
+                part = replace(job, scene=one_K[0], cases=one_K[1], key=uuid4().hex)  # another session
+                with results_of(part, numbers, address, console) as results:
+                    solve_remaining(part, len(numbers), results, directory, console)
         rows = (row for row in series_file.rows(directory) if row["case"] < job.cases.count)
         return summary(rows, job.cases.count, console)
 
@@ -94,7 +103,7 @@ def identity(job: Job) -> dict[str, Any]:
 
 
 def metadata(job: Job) -> dict[str, Any]:
-    size = job.scene.expected_size
+    size, scene = job.scene.expected_size, job.cases.scene_of(0)
     return {
         "scene": job.scene.name,
         "title": job.scene.title,
@@ -104,6 +113,7 @@ def metadata(job: Job) -> dict[str, Any]:
         "n": size[0] if size else None,
         "threads": job.threads,
         "check": job.check,
+        "fasteners": list(fastener_forces(scene, np.zeros(scene.joint.size[0]))) if scene else [],
         **machine(),
     }
 

@@ -21,7 +21,6 @@ from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints, installed_version, stamp
 from harness.scene.allowed_gap import check_answer
-from harness.scene.fastener_forces import fastener_forces
 from harness.scene.mesh_error import estimated, mesh_record
 from harness.scene.scene_file import edited
 from harness.scene.solution import solve
@@ -35,6 +34,7 @@ from problems.errors import Fault, InputError
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.model.effect import SpringEffect
+from problems.model.fastener_forces import fastener_forces
 from problems.model.positions import FORCES
 from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter

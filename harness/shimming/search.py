@@ -23,11 +23,10 @@ import numpy as np
 from harness.placement.candidates import Place, Plan
 from harness.placement.plan_search import DIGITS, ESTIMATED, PlanSearch, Step
 from harness.placement.session import Outcome, Study
-from harness.scene.fastener_forces import fastener_forces
 from harness.scene.stress import largest_of
 from problems.effects.shims import Shims
 from problems.forms.assembly import Assembly, Mask, Vector
-from problems.model.effect import SpringEffect
+from problems.model.fastener_forces import fastener_forces, force_error_per_mm
 from problems.model.surface import surface_of
 
 from .patches import Patch
@@ -67,9 +66,7 @@ class ShimStudy(Study):
         if self.limits[0] < inf:
             at = assembly.at_junction(x())
             force = max(abs(fastener["force_N"]) for fastener in fastener_forces(self.bare, at))
-            for effect in self.bare.effects_of(SpringEffect):
-                T, k = effect.springs(self.bare.joint)
-                force += float((k * abs(T).sum(axis=0)).max()) * error_mm
+            force += force_error_per_mm(self.bare) * error_mm
         if self.limits[1] < inf:
             stress = largest_of(self.bare, x())
         return *gaps, *volumes, force, stress

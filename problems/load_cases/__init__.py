@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from problems.forms.assembly import LoadCase
+from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
 
@@ -30,6 +31,18 @@ class LoadCases(ABC):
     def only(self, numbers: Sequence[int]) -> "LoadCases":
         """The data of these cases alone, for a worker; the cases keep their numbers."""
         return self
+
+    def scene_of(self, k: int) -> JointScene | None:
+        """The scene with the fasteners of case k, where their forces are to be recorded."""
+        return None
+
+    def stiffness_of(self, k: int) -> tuple[float, ...]:
+        """What tells the K of case k from those of others."""
+        return ()
+
+    def of_stiffness(self, k: int, scene: Scene) -> "tuple[Scene, LoadCases]":
+        """The scene with the K of case k, and the load cases of those with this K."""
+        return scene, self
 
     def parameters(self, k: int) -> dict[str, float | str]:
         """The values that distinguish case k from others, for its row."""

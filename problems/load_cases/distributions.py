@@ -8,7 +8,9 @@ import numpy as np
 from problems.forms.assembly import Vector
 from problems.input.bounded_types import unknown
 
-SYNTAX = "[each] NAME(PARAMETERS) of scipy.stats, as in normal(1000, 100) or lognorm(s=0.1, scale=1000)"
+SYNTAX = (
+    "[each] NAME(PARAMETERS) of scipy.stats, as in normal(1000, 100), or N of it, as in 8 of normal(5, 1)"
+)
 TAIL = 1e-9  # rarer values are not drawn: whether a key allows all is then known beforehand
 
 

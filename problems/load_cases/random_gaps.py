@@ -61,11 +61,11 @@ class RandomGaps(LoadCases):
     def load(self, k: int) -> LoadCase:
         return LoadCase(self.rest.f, self.rest.g + self.gap(k, self.field))
 
-    def gap(self, k: int, law: InitialGap) -> Vector:
-        """The gap of case k, (m,) mm, with this law of the field."""
+    def gap(self, k: int | None, law: InitialGap) -> Vector:
+        """The gap of case k, (m,) mm, with this law of the field; without k the mean of all cases."""
         assert law.random is not None
-        seed, sd = self.parameters(k)["gap_seed"], law.random.sd
-        field = law.model_copy(update={"random": law.random.model_copy(update={"seed": seed})})
+        seed, sd = (0, 0.0) if k is None else (self.parameters(k)["gap_seed"], law.random.sd)
+        field = law.model_copy(update={"random": law.random.model_copy(update={"seed": seed, "sd": sd})})
         if self.scan is None:
             return field.gap(self.joint)
         scan, random = self.scan, np.random.default_rng((seed, 1))

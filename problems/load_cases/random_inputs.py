@@ -1,14 +1,17 @@
 """Load cases in which keys of a scene are random: fasteners.preload=normal(1000, 100), beside the gap.
 
 An input is one number, or `each` one for each element of an effect, or the random field of the gap. Its draw
-n depends on the seed, n and its name alone. Case k has draw k of all inputs. For contributors of d inputs
+n depends on the seed, n and its name alone. `N of` a distribution are its N quantiles (i + ½)/N, all equally
+likely; a key of K has these, and each its K. Case k has draw k of all inputs. For contributors of d inputs
 (Saltelli, Comput. Phys. Commun. 145:280–297, 2002), case k = j(d + 2) + r of base point j has draws 2j if
 r = 0, draws 2j + 1 if r = 1, and if r = 2 + i draws 2j of all but input i, of which it has draw 2j + 1.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 
@@ -25,32 +28,38 @@ from .distributions import distribution, values_at
 from .random_gaps import RandomGaps
 from .sweep import Key, allowed_keys, keys_of
 
+LAW = re.compile(r"(?:(each) |(\d+) of )?(.*)", re.DOTALL)
+FEW = "N of DISTRIBUTION: it changes K, and a K is kept for each of N values"
+
 
 @dataclass(frozen=True)
 class Input(Key):
-    """A key, its distribution as text and of scipy, and the number of its elements; 0 without `each`."""
+    """A key, its distribution as text and of scipy, the number of its elements, 0 without `each`, and of its
+    values, 0 if these are all of the distribution.
+    """
 
     text: str
     law: Any
     elements: int
+    levels: int
+    changes_K: bool
+
+    def at(self, shares: Vector) -> Vector:
+        """The values (k,) at these shares of the distribution, 0 to 1."""
+        few = (np.minimum(np.floor(self.levels * shares), self.levels - 1) + 0.5) / max(self.levels, 1)
+        return values_at(self.law, few if self.levels else shares)
 
     def draw(self, seed: int, n: int) -> Vector:
         random = np.random.default_rng((seed, n, int(digest(self.name)[:16], 16)))
-        return values_at(self.law, random.random(max(self.elements, 1)))
+        return self.at(random.random(max(self.elements, 1)))
 
 
 @dataclass(frozen=True)
 class RandomInputs(LoadCases):
-    """The load cases of random inputs.
-
-    pieces : the effects that change, by their numbers in the scene; the elements of one that has `each`.
-    rest : f and g of the others. gaps : of the field, if it is an input. contributors : see above.
-    """
+    """The load cases of random inputs. gaps : of the field, if it is an input. contributors : see above."""
 
     scene: JointScene
     inputs: tuple[Input, ...]
-    pieces: dict[int, list[Any]]
-    rest: LoadCase
     gaps: RandomGaps | None
     seed: int
     count: int
@@ -83,17 +92,63 @@ class RandomInputs(LoadCases):
         row = {one.name: v.tolist() if one.elements else float(v[0]) for one, v in drawn}
         return row | (self.gaps.parameters(self.draws(k)[-1]) if self.gaps else {})
 
-    def load(self, k: int) -> LoadCase:
+    def stiffness_of(self, k: int) -> tuple[float, ...]:
+        drawn = zip(self.inputs, self.draws(k), strict=False)
+        return tuple(float(one.draw(self.seed, n)[0]) for one, n in drawn if one.changes_K)
+
+    def of_stiffness(self, k: int, scene: Scene) -> tuple[Scene, LoadCases]:
+        cases = self.with_stiffness(self.values(k))
+        return cases.scene, cases
+
+    def with_stiffness(self, values: Iterable[Vector]) -> "RandomInputs":
+        """The cases on the scene with the K of these numbers of each of `inputs`, whose loads may differ."""
+        effects = list(self.scene.effects)
+        for one, v in zip(self.inputs, values, strict=True):
+            if one.changes_K:
+                effects[one.effect] = one.changed(effects[one.effect], float(v[0]), self.scene.joint)
+        return replace(self, scene=replace(self.scene, effects=tuple(effects)))
+
+    @cached_property
+    def pieces(self) -> dict[int, list[Any]]:
+        """The effects that change, by their numbers in the scene; the elements of one that has `each`."""
+        inputs = sorted((one for one in self.inputs if not one.changes_K), key=lambda one: one.elements)
+        effects, joint, each = self.scene.effects, self.scene.joint, {}
+        for i, count in {one.effect: one.elements for one in inputs}.items():
+            field = self.gaps.field if self.gaps and isinstance(effects[i], InitialGap) else effects[i]
+            each[i] = [field.only([k], joint) for k in range(count)] or [field]
+        return each
+
+    @cached_property
+    def rest(self) -> LoadCase:
+        """f and g of the other effects."""
+        others = (effect for i, effect in enumerate(self.scene.effects) if i not in self.pieces)
+        fixed = [effect for effect in others if not (self.gaps and isinstance(effect, InitialGap))]
+        return load_case(self.scene, self.form, fixed)
+
+    def changed(self, values: Iterable[Vector]) -> list[Any]:
+        """The effects that change f or g, with these numbers of each of `inputs`."""
         pieces = dict(self.pieces)
-        for one, v in zip(self.inputs, self.values(k), strict=True):
-            pairs = zip(pieces[one.effect], np.resize(v, len(pieces[one.effect])), strict=True)
-            pieces[one.effect] = [one.changed(*pair, self.scene.joint) for pair in pairs]
-        effects = [effect for some in pieces.values() for effect in some]
+        for one, v in zip(self.inputs, values, strict=True):
+            if not one.changes_K:
+                pairs = zip(pieces[one.effect], np.resize(v, len(pieces[one.effect])), strict=True)
+                pieces[one.effect] = [one.changed(*pair, self.scene.joint) for pair in pairs]
+        return [effect for some in pieces.values() for effect in some]
+
+    def scene_of(self, k: int) -> JointScene:
+        fixed = (effect for i, effect in enumerate(self.scene.effects) if i not in self.pieces)
+        return replace(self.scene, effects=(*fixed, *self.changed(self.values(k))))
+
+    def load(self, k: int) -> LoadCase:
+        return self.load_at(self.values(k), self.draws(k)[-1])
+
+    def load_at(self, values: Iterable[Vector], field: int | None = None) -> LoadCase:
+        """The load of these numbers of each of `inputs`. field : the draw of the random gap, or its mean."""
+        effects = self.changed(values)
         laws = [effect for effect in effects if self.gaps and isinstance(effect, InitialGap)]
         change = load_case(self.scene, self.form, [effect for effect in effects if effect not in laws])
         g = self.rest.g + change.g
         if self.gaps:
-            g += self.gaps.gap(self.draws(k)[-1], *(laws or [self.gaps.field]))
+            g += self.gaps.gap(field, *(laws or [self.gaps.field]))
         return LoadCase(self.rest.f + change.f if change.f.any() else self.rest.f, g)
 
 
@@ -105,18 +160,21 @@ def random_inputs(
     count: int,
     seed: int,
     N: int | None,
+    stiffness: bool = False,
 ) -> RandomInputs:
-    """Load cases of laws KEY=[each] DISTRIBUTION. Raises InputError with all faults.
+    """Load cases of laws KEY=[each | COUNT of] DISTRIBUTION. Raises InputError with all faults.
 
     gaps : random gaps, one more input. N : base points; the cases are then the N (d + 2) for contributors.
+    stiffness : whether keys may change K.
     """
     if not isinstance(scene, JointScene):
         raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}))
-    keys, faults, inputs = keys_of(scene), list[Fault](), list[Input]()
+    keys, loads, faults, inputs = keys_of(scene, stiffness), keys_of(scene), list[Fault](), list[Input]()
     if gaps and gaps.points is not None:  # a scan has one correlation length
         keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}
     for name, text in [[part.strip() for part in law.partition("=")[::2]] for law in laws]:
-        key, bare, where = keys.get(name), text.removeprefix("each "), f"--random {name}"
+        each, levels, bare = cast(re.Match[str], LAW.fullmatch(text)).groups()
+        key, where = keys.get(name), f"--random {name}"
         if key is None or name in [one.name for one in inputs]:
             allowed = "one distribution of each key" if key else allowed_keys(keys)
             faults.append(Fault("--random", "key", name, allowed))
@@ -126,21 +184,19 @@ def random_inputs(
             faults.append(Fault(where, "distribution", text, str(error)))
             continue
         if key:
-            elements = scene.effects[key.effect].element_count(scene.joint) if bare != text else 0
-            inputs.append(Input(**vars(key), text=text, law=law, elements=elements))
-            if bare != text and not elements:
+            elements = scene.effects[key.effect].element_count(scene.joint) if each else 0
+            how = text, law, elements, int(levels or 0), name not in loads
+            inputs.append(one := Input(key.name, key.effect, key.path, *how))
+            if each and not elements:
                 faults.append(Fault(where, "each", text, "left out: it has no elements at points"))
-            for value in values_at(law, np.array([0.0, 1.0])).tolist():
+            if one.changes_K and not one.levels:
+                faults.append(Fault(where, "distribution", text, FEW))
+            for value in one.at(np.array([0.0, 1.0])).tolist():
                 faults += key.faults(scene, value, f"{where}={text}")
     d = len(inputs) + bool(gaps)
     if N is not None and (d < 2 or N < 2 or N & (N - 1)):
         faults.append(Fault("--contributors", "N, inputs", (N, d), "a power of 2, and two inputs or more"))
     if faults:
         raise InputError(faults)
-    effects = [gaps.field if gaps and isinstance(effect, InitialGap) else effect for effect in scene.effects]
-    counts = {one.effect: one.elements for one in sorted(inputs, key=lambda one: one.elements)}
-    each = {i: [effects[i].only([k], scene.joint) for k in range(q)] for i, q in counts.items()}
-    fixed = [e for i, e in enumerate(effects) if i not in each and not (gaps and isinstance(e, InitialGap))]
-    pieces, rest = {i: some or [effects[i]] for i, some in each.items()}, load_case(scene, form, fixed)
     count, notes = (N * (d + 2) if N else count), (gaps.notes if gaps else ())
-    return RandomInputs(scene, tuple(inputs), pieces, rest, gaps, seed, count, form, bool(N), notes)
+    return RandomInputs(scene, tuple(inputs), gaps, seed, count, form, bool(N), notes)

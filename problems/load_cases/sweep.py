@@ -133,7 +133,7 @@ def keys_of(scene: JointScene, stiffness: bool = False) -> dict[str, Key]:
     keys: dict[str, Key] = {}
     for i, effect in enumerate(scene.effects):
         changes_K = isinstance(effect, StiffnessEffect) and not stiffness
-        paths = [] if changes_K else _numbers(effect.model_dump())
+        paths = [] if changes_K else _numbers(dict(effect) | effect.model_dump())  # unset ones, too
         if isinstance(effect, SpringEffect) and not stiffness:  # the others change K
             paths = [path for path in paths if path[0] in SpringEffect.model_fields]
         elif isinstance(effect, Positions):

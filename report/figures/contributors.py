@@ -1,5 +1,5 @@
-"""The share of the variance of a gap y that each random input x of a series contributes: of the largest gap
-per case, with intervals, and of the gap at each contact.
+"""The share of the variance of a figure y that each random input x of a series contributes: of the largest
+gap and force and of the force in each fastener, with intervals, and of the gap at each contact.
 
     first order  V(E(y | x)) / V(y),    total  E(V(y | all but x)) / V(y)
 
@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 
-from report.results.series_results import Array, Series
+from report.results.series_results import AT_ONCE, Array, Series
 
 from . import style
 from .junction_maps import Map, Scale, drawn
@@ -23,39 +23,47 @@ ORDERS = {"first_order": style.BLUE, "total_order": style.VERMILLION}
 ENDS, RESAMPLES = (0.025, 0.975), 999
 
 
-def indices(series: Series) -> pd.DataFrame:
-    """A row per input; none unless these are cases for contributors and all are answered."""
-    from scipy.stats import sobol_indices  # slow to import
-
-    if series.facts.get("cases_per_point", 1) == 1 or len(series.cases) < series.facts["cases"]:
-        return pd.DataFrame()
-    f, random = _answers(series, series.cases[["max_gap_mm"]].to_numpy()), np.random.default_rng(0)
+def indices(series: Series, y: Array, error: float) -> pd.DataFrame:
+    """A row per input, of y (cases,), which is known up to an error."""
+    f, random = _answers(series, y[:, None], error)[:, 0], np.random.default_rng(0)
     N, table = f.shape[-1], pd.DataFrame({"input": series.facts["random_inputs"]})
-    picked = (random.integers(N, size=N) if k else np.arange(N) for k in range(RESAMPLES + 1))
-    parts = ({"f_A": f[0][:, i], "f_B": f[1][:, i], "f_AB": f[2:, :, i]} for i in picked)
-    made = (sobol_indices(func=part, n=N) for part in parts)
-    estimates = np.array([(one.first_order, one.total_order) for one in made])
-    low, high = np.quantile(estimates[1:], ENDS, axis=0)
+    picked = np.vstack([np.arange(N), random.integers(N, size=(RESAMPLES, N))])
+    pieces = np.array_split(picked, -(-picked.size * len(f) // AT_ONCE))
+    estimates = np.concatenate([_estimated(f[:, some]) for some in pieces], axis=2)
+    low, high = np.quantile(estimates[:, :, 1:], ENDS, axis=2)
     for k, order in enumerate(ORDERS):
-        table[order], table[f"{order}_low"], table[f"{order}_high"] = estimates[0, k], low[k], high[k]
+        table[order], table[f"{order}_low"], table[f"{order}_high"] = estimates[k, :, 0], low[k], high[k]
     return table
 
 
 def of_contacts(series: Series) -> Array:
     """(2, d, m): both indices of each of d inputs for the gap at each contact; 0 where it does not vary."""
-    from scipy.stats import sobol_indices
-
-    pieces = []
-    for gaps in series.of_contacts():
-        f = _answers(series, gaps)
-        made = sobol_indices(func={"f_A": f[0], "f_B": f[1], "f_AB": f[2:]}, n=f.shape[-1])
-        pieces.append([order.reshape(-1, len(f) - 2).T for order in (made.first_order, made.total_order)])
-    return np.concatenate(pieces, axis=2)
+    error = series.cases["gap_error_mm"].max()
+    return np.concatenate(
+        [_estimated(_answers(series, gaps, error)) for gaps in series.of_contacts()], axis=2
+    )
 
 
-def _answers(series: Series, y: Array) -> Array:
-    """(d + 2, s, N) of y (cases, s), mm: at A, B, and A with one column of B each; 0 where y is constant."""
-    varies = np.ptp(y, axis=0) > 2 * series.cases["gap_error_mm"].max()
+def of_forces(series: Series) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows of the largest force, and these with those of each fastener."""
+    error, places = series.cases["force_error_N"].max(), series.facts["fasteners"]
+    largest = indices(series, abs(series.forces).max(axis=1), error)
+    pairs = zip(places, series.forces.T, strict=True)
+    each = [indices(series, y, error).assign(**{k: at[k] for k in ("kind", "x", "y")}) for at, y in pairs]
+    return largest, pd.concat([largest.assign(kind="largest"), *each])
+
+
+def _estimated(f: Array) -> Array:
+    """(2, d, s): both indices of d inputs, of s figures, by f (d + 2, s, N) of `_answers`."""
+    from scipy.stats import sobol_indices  # slow to import
+
+    made = sobol_indices(func={"f_A": f[0], "f_B": f[1], "f_AB": f[2:]}, n=f.shape[-1])
+    return np.array([order.reshape(-1, len(f) - 2).T for order in (made.first_order, made.total_order)])
+
+
+def _answers(series: Series, y: Array, error: float) -> Array:
+    """(d + 2, s, N) of y (cases, s): at A, B, and A with one column of B each; 0 where y is constant."""
+    varies = np.ptp(y, axis=0) > 2 * error
     return (y * varies).reshape(-1, series.facts["cases_per_point"], y.shape[1]).transpose(1, 2, 0)
 
 

@@ -23,7 +23,7 @@ AT_ONCE = 2**22  # gaps read at a time
 
 FIGURES = (
     *("max_gap_mm", "mean_gap_mm", "gap_error_mm", "bound_mm", "displacement_error_mm"),
-    *("setup_s", "solve_s", "form_s"),
+    *("setup_s", "solve_s", "form_s", "force_error_N"),
 )
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
 LEVELS = 200  # thresholds of the exceedance curve
@@ -33,7 +33,7 @@ CONFIDENCE = 0.95
 @dataclass(frozen=True)
 class Series:
     """A series. cases : the answered ones, in order; gaps : (cases, m), mm, on disk; code : the `commit` of
-    each case, and whether it was `clean`.
+    each case, and whether it was `clean`; forces : (cases, r), N, in fasteners, none without springs.
     """
 
     facts: dict[str, Any]
@@ -44,6 +44,7 @@ class Series:
     fasteners: Array
     swept: list[str]
     code: pd.DataFrame
+    forces: Array
 
     @property
     def marks(self) -> dict[str, list[list[float]]]:
@@ -79,6 +80,7 @@ def read(directory: Path) -> Series:
     verdicts: dict[int, str] = {}
     swept: list[str] = []
     code: dict[int, tuple[str, bool | None]] = {}
+    forces: dict[int, list[float]] = {}
     for row in series_file.rows(directory):
         case = row["case"]
         if case >= count:
@@ -88,6 +90,7 @@ def read(directory: Path) -> Series:
         if row.get("max_gap_mm") is not None:
             swept = swept or [key for key in row if "." in key and not facts.get("random_inputs")]
             rows[case] = (case, *(row.get(name) for name in FIGURES), *(row[key] for key in swept))
+            forces[case] = row.get("fastener_forces_N", [])
     kept = [row for row in rows.values() if row]
     swept = quoted(swept)
     cases = pd.DataFrame(kept, columns=["case", *FIGURES, *swept], dtype=float)
@@ -96,7 +99,9 @@ def read(directory: Path) -> Series:
     nodes, fasteners = contacts.get("contact_nodes"), contacts.get("fasteners", np.zeros((0, 2)))
     gaps = series_file.StoredGaps(directory, int(contacts["m"]))
     made = pd.DataFrame(quoted(list(map(list, code.values()))), columns=["commit", "clean"])
-    return Series(facts, quoted(Counter(verdicts.values())), cases, gaps, nodes, fasteners, swept, made)
+    tension = np.array([forces[case] for case in cases["case"]], dtype=float).reshape(len(cases), -1)
+    counts = quoted(Counter(verdicts.values()))
+    return Series(facts, counts, cases, gaps, nodes, fasteners, swept, made, tension)
 
 
 def quantile_maps(series: Series) -> Array:

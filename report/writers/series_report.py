@@ -11,7 +11,7 @@ from report.analysis.checks import code_warnings
 from report.document.blocks import Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import file_name
 from report.document.numbers import counted, out_of, significant, tidy_power
-from report.figures import contributors, style
+from report.figures import style
 from report.figures.junction_maps import Map, drawn, larger_than, rooted
 from report.page.contact_maps import hover_names, map_controls, series_maps
 from report.page.page_figures import exceedance_figure, item, map_item
@@ -27,6 +27,7 @@ from report.results.series_results import (
     read,
 )
 from report.writers.sections_writer import emptied, written
+from report.writers.series_contributors import contributors_of
 from report.writers.sheet import MESH, Sheet, exactness, origin, write_sheet
 
 MAPPED = (0.5, 0.95, 0.99)
@@ -53,15 +54,9 @@ def write(directory: Path) -> Path:
         maps, curve = quantile_maps(series), exceedance(series)
         with style.applied():
             spread = [_swept(series, key) for key in series.swept] or [_convergence(series)]
-            blocks = [*_maps(series, maps), _exceedance(curve, len(series.cases)), *spread]
-            if len(table := contributors.indices(series)):
-                caption = "*Contributors: shares of the variance of the largest gap*, with 95 % intervals."
-                blocks.append(Figure("contributors", caption, contributors.bars(table), table))
-                if series.nodes is not None:
-                    made = contributors.maps(series, series.nodes)
-                    caption = "*The same of the gap at each contact: the total share of each input.*"
-                    blocks.append(Figure("contributors-map", caption, *made))
-        sections.append(Section("The remaining gap", [*blocks, _statistics(series)]))
+            figures = [*_maps(series, maps), _exceedance(curve, len(series.cases)), *spread]
+            blocks = [*figures, *contributors_of(series), _statistics(series)]
+        sections.append(Section("The remaining gap", blocks))
         write_page(
             target / "index.html", title, series_data(series, maps, [*PERCENT.values(), "mean"], curve)
         )

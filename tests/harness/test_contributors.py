@@ -8,19 +8,24 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy import stats
+from small_joints import two_parts
 from strip_scene import write_strip
 
 from harness.results import series_file
 from harness.series.load_case_source import GapCases
 from harness.series.session import Job, SeriesSession
-from problems.build import prepared
+from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases.random_inputs import RandomInputs
+from problems.load_cases.sweep import keys_of
+from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
+from report.document.blocks import Figure
 from report.figures.contributors import indices, of_contacts
 from report.results.series_results import Series, read
+from report.writers.series_contributors import contributors_of
 
 FIXED = ("random = {", "# random = {")
 
@@ -29,7 +34,12 @@ def series_of(cases: RandomInputs, y: np.ndarray) -> Series:
     """A series whose largest gaps are y, (cases,) mm."""
     table = pd.DataFrame({"case": np.arange(len(y)), "max_gap_mm": y, "gap_error_mm": 1e-12})
     facts = cases.facts | {"cases": cases.count}
-    return Series(facts, {}, table, None, None, np.zeros((0, 2)), [], pd.DataFrame())
+    none = np.zeros((len(y), 0))
+    return Series(facts, {}, table, None, None, np.zeros((0, 2)), [], pd.DataFrame(), none)
+
+
+def of_gaps(series: Series) -> pd.DataFrame:
+    return indices(series, series.cases["max_gap_mm"].to_numpy(), series.cases["gap_error_mm"].max())
 
 
 def drawn(scene: JointScene, N: int, *random: str) -> RandomInputs:
@@ -52,7 +62,7 @@ def test_of_a_joint_without_contact(tmp_path: Path) -> None:
     def gap(load: LoadCase) -> float:
         return float(load.g[j] - row @ load.f)
 
-    found = indices(series_of(cases, np.array([gap(cases.load(k)) for k in range(cases.count)])))
+    found = of_gaps(series_of(cases, np.array([gap(cases.load(k)) for k in range(cases.count)])))
     preload, pressure = scene.effects[1:3]
     points = [preload.model_copy(update={"points": (point,)}) for point in preload.points]
     of_preload = sum((row @ one.force(scene.joint) / 60.0 * sd["fasteners.preload"]) ** 2 for one in points)
@@ -93,7 +103,7 @@ def test_of_a_joint_in_contact(tmp_path: Path) -> None:
     y = largest(Listed(tuple(loads)), len(loads)).reshape(10, 10)
     first = np.array([y.mean(axis=1).var(), y.mean(axis=0).var()]) / y.var()
     assert 1 - first.sum() > 0.02  # the inputs act together
-    assert_near(indices(series_of(cases, largest(cases, cases.count))), first, 1 - first[::-1])
+    assert_near(of_gaps(series_of(cases, largest(cases, cases.count))), first, 1 - first[::-1])
 
 
 def test_what_is_written(tmp_path: Path) -> None:
@@ -107,28 +117,84 @@ def test_what_is_written(tmp_path: Path) -> None:
     assert [row["case"] for row in series_file.rows(out)] == [*range(16)]
     within = [row["max_gap_mm"] <= 0.4 for row in series_file.rows(out)]
     kept = sum(within[k] for k in range(16) if k % 4 < 2)
-    low, high = stats.binomtest(kept, 8).proportion_ci(0.95, "exact")
+    low, high = stats.binomtest(kept, 8).proportion_ci(0.95, "wilson")
     assert f"between {low:.2%} and {high:.2%}" in " ".join(done.output.split())
     table = pd.read_csv(out / "report/contributors.csv")
-    pd.testing.assert_frame_equal(table, indices(read(out)), rtol=1e-12)
+    pd.testing.assert_frame_equal(table, of_gaps(read(out)), rtol=1e-12)
     assert table["input"].tolist() == ["pressure.value", "initial_gap.random"]
     assert (out / "report/contributors.png").stat().st_size > 1000
     done = read(out)
     table = pd.read_csv(out / "report/contributors-map.csv")
     for j in (0, 22):
         gap = done.gaps[np.arange(16), j : j + 1][:, 0].astype(float)
-        alone = indices(replace(done, cases=done.cases.assign(max_gap_mm=gap)))
+        alone = of_gaps(replace(done, cases=done.cases.assign(max_gap_mm=gap)))
         for order in ("first_order", "total_order"):
             row = table[[f"{name}, {order}" for name in alone["input"]]].iloc[j]
             np.testing.assert_allclose(row, alone[order], rtol=1e-9)
     assert of_contacts(done).shape == (2, 2, 45)
-    lost = replace(read(out), cases=read(out).cases[1:])
-    assert indices(lost).empty
+    assert contributors_of(done)
+    assert not contributors_of(replace(done, cases=done.cases[1:]))
+
+
+def test_forces_in_fasteners(tmp_path: Path) -> None:
+    """Each is that of the scene with the values of its row; far from contact it is linear in the inputs."""
+    text = f"""{two_parts()}
+[[effect]]
+kind = "initial_gap"
+mean = 9.0
+[[effect]]
+kind = "installed_fasteners"
+points = [[20.0, 10.0], [80.0, 40.0]]
+stiffness = 1e3
+[[effect]]
+kind = "pressure"
+part = "a"
+value = 1e-4
+"""
+    path = tmp_path / "tied.toml"
+    path.write_text(text)
+    scene = read_scene(str(path))
+    sd = {"installed_fasteners.approach": 0.01, "installed_fasteners.preload": 2.0, "pressure.value": 2e-4}
+    mean = {"installed_fasteners.approach": 0.0, "installed_fasteners.preload": 60.0, "pressure.value": 1e-4}
+    cases = drawn(scene, 64, *(f"{key}=normal({mean[key]}, {sd[key]})" for key in sd))
+    job = Job(scene=scene, cases=cases, form="dual", check=0, threads=1)
+    rows = [row for some in SeriesSession(job).solve(range(cases.count)) for row, _ in some]
+
+    def forces(values: dict[str, float]) -> np.ndarray:
+        keys, effects = keys_of(scene), list(scene.effects)
+        for name, value in values.items():
+            number = keys[name].effect
+            effects[number] = keys[name].changed(effects[number], value, scene.joint)
+        changed = replace(scene, effects=tuple(effects))
+        x = prepared(changed).assembly.K.solve(load_case(changed).f)
+        return np.array([one["force_N"] for one in fastener_forces(changed, x)])
+
+    row = rows[5]
+    np.testing.assert_allclose(row["fastener_forces_N"], forces({key: row[key] for key in sd}), rtol=1e-9)
+    assert row["force_error_N"] < 1e-3
+    a = np.array([forces(mean | {key: mean[key] + sd[key]}) - forces(mean) for key in sd])
+    exact = a**2 / (a**2).sum(axis=0)
+    series = series_of(cases, np.array([row["max_gap_mm"] for row in rows]))
+    places = [*fastener_forces(scene, np.zeros(scene.joint.size[0]))]
+    series = replace(
+        series,
+        facts=series.facts | {"fasteners": places},
+        cases=series.cases.assign(force_error_N=[row["force_error_N"] for row in rows]),
+        forces=np.array([row["fastener_forces_N"] for row in rows]),
+    )
+    _, figure = contributors_of(series)
+    assert isinstance(figure, Figure)
+    assert figure.name == "contributors-force"
+    table = figure.data
+    assert table is not None
+    for (_, found), share in zip(table.dropna(subset="x").groupby("x"), exact.T, strict=True):
+        assert_near(found.reset_index(drop=True), share, share)
+    assert table["input"].tolist() == [*sd] * 3
 
 
 def test_a_gap_that_does_not_vary_has_no_contributors(tmp_path: Path) -> None:
     cases = drawn(read_scene(str(write_strip(tmp_path))), 2, "pressure.value=normal(1e-4, 1e-5)")
-    found = indices(series_of(cases, 0.1 + 1e-12 * np.arange(8) / 8))
+    found = of_gaps(series_of(cases, 0.1 + 1e-12 * np.arange(8) / 8))
     assert not found.drop(columns="input").to_numpy().any()
 
 

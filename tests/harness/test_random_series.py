@@ -8,9 +8,12 @@ from commands import harness
 from strip_scene import STRIP
 
 from harness.results import series_file
+from harness.scene.solution import solve
+from harness.series.derivatives import derivatives
 from harness.series.load_case_source import GapCases
 from harness.series.session import Job, SeriesSession
 from problems.scene_files import read_scene
+from rivetbench import run_series
 
 TABLE = '\n[random]\nfasteners.preload = "each normal(60, 5)"\npressure.value = "uniform(0, 2e-4)"\n'
 
@@ -62,7 +65,7 @@ def test_the_cases_do_not_depend_on_their_order_or_worker(scene: Path) -> None:
     ("options", "said"),
     [
         (("--random", "fasteners.preload=normal(60, 20)"), "must be greater than 0"),
-        (("--random", "ribs.I=normal(60, 20)"), "what changes K"),
+        (("--random", "ribs.I=uniform(60, 20)"), "N of DISTRIBUTION: it changes K"),
         (("--random", "pressure.value=norm()", "--sweep", "initial_gap.mean=1,2"), "random gaps, --gaps or"),
     ],
 )
@@ -88,3 +91,34 @@ def test_a_sweep_leaves_the_table_out(scene: Path, tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert not any("fasteners.preload" in row for row in rows_of(tmp_path / "out"))
     assert (tmp_path / "out/report/sweep-initial_gap.mean.csv").exists()
+
+
+def test_a_key_of_K_has_a_K_for_each_of_its_values(tmp_path: Path) -> None:
+    """Each case is the scene with the values of its row, the weight of the pad included."""
+    pad = 'kind = "local_thickness"\npart = "a"\nthickness = 4.0\nx = [0.0, 200.0]\ny = [0.0, 120.0]'
+    text, path = (
+        f'{STRIP}[[effect]]\n{pad}\n[[effect]]\nkind = "self_weight"\npart = "a"\n',
+        tmp_path / "pad.toml",
+    )
+    path.write_text(text)
+    laws = {"ribs.I": "3 of uniform(1000, 3000)", "local_thickness.thickness": "2 of uniform(4, 2)"}
+    laws["pressure.value"] = "uniform(0, 2e-4)"
+    source = GapCases(random=tuple(f"{name}={law}" for name, law in laws.items()), contributors=2)
+    assert run_series(path, tmp_path / "out", source, report=False).code == 0
+    rows = rows_of(tmp_path / "out")
+    middles = {"ribs.I": (1500, 2500, 3500), "local_thickness.thickness": (4.5, 5.5)}
+    for name, values in middles.items():
+        assert {round(row[name], 4) for row in rows} <= {*values}
+    assert len({(row["ribs.I"], row["local_thickness.thickness"]) for row in rows}) > 2
+    read = read_scene(str(path))
+    drawn = source.of(read, "dual", stiffness=True)
+    for row in rows:
+        assert drawn.parameters(row["case"]).items() <= row.items()
+        shown = text.replace("I = 2e3", f"I = {row['ribs.I']!r}").replace(
+            "seed = 7", f"seed = {row['gap_seed']}"
+        )
+        shown = shown.replace("thickness = 4.0", f"thickness = {row['local_thickness.thickness']!r}")
+        path.write_text(shown.replace("value = 1e-4", f"value = {row['pressure.value']!r}"))
+        assert row["max_gap_mm"] == pytest.approx(solve(read_scene(str(path))).gap.max(), abs=1e-9)
+    slopes = derivatives(Job(scene=read, cases=drawn, form="dual"))["derivative"]
+    assert np.isnan(slopes).tolist() == [True, True, False]

@@ -20,7 +20,6 @@ from harness import solve
 from harness.placement.answer_journal import AnswerJournal
 from harness.placement.fresh_cases import Goal
 from harness.placement.session import Outcome, PlanSession, Question
-from harness.scene.fastener_forces import fastener_forces
 from harness.series.load_case_source import GapCases
 from harness.shimming.each import each_joint
 from harness.shimming.gap_regions import patches_of_gap
@@ -31,6 +30,7 @@ from problems.effects.shims import Shims
 from problems.errors import InputError
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
+from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.reporter import SILENT
 from problems.scene_files import read_scene

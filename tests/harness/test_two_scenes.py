@@ -12,9 +12,9 @@ from small_joints import two_parts
 from superelements import write_part
 
 from harness.cli.scene import STARTER
-from harness.scene.fastener_forces import fastener_forces
 from harness.scene.two_scenes import common_places
 from problems.build import load_case, prepared
+from problems.model.fastener_forces import fastener_forces
 from problems.scene_files import read_scene
 
 FASTENERS = """

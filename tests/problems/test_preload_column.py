@@ -7,13 +7,13 @@ import pytest
 from commands import harness
 from small_joints import two_parts
 
-from harness.scene.fastener_forces import fastener_forces
 from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.effects.fasteners import Fasteners
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.stream import Stream
+from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from rivetbench import GapCases, run_series

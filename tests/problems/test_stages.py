@@ -9,12 +9,12 @@ import pytest
 from small_joints import untied
 from superelements import stiffnesses, write_part
 
-from harness.scene.fastener_forces import fastener_forces
 from harness.scene.solution import Solution, solve
 from problems.build import load_case, prepared, shares_stiffness
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Matrix
+from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.model.stage_answers import Elongations, locked, stage_scenes, through
 from problems.scene_files import read_scene, scene_of
