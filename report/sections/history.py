@@ -17,7 +17,7 @@ from report.figures import style
 from report.results.reader import Results
 from report.results.rows import CELL, VERSION, cells_of
 
-DAY = 10  # characters of a time
+MINUTE = 16  # characters of a time: states of a plug-in follow one another within a day
 POINT = ["solver", *VERSION]
 CAPTION = (
     "*Libraries over versions and dates*, on the scenes that all versions have: the best form's seconds per "
@@ -56,7 +56,11 @@ def _lines(cells: pd.DataFrame, rounds: pd.DataFrame) -> pd.DataFrame:
         versions = of_solver.groupby(POINT).ngroups
         common = of_solver[of_solver.groupby("scene")["scene"].transform("size") == versions]
         for (solver, version, _), own in common.groupby(POINT) if versions > 1 else ():
-            line = {"solver": solver, "solver_version": version, "measured": own["recorded_at"].max()[:DAY]}
+            line = {
+                "solver": solver,
+                "solver_version": version,
+                "measured": own["recorded_at"].max()[:MINUTE],
+            }
             line |= {"scenes": len(own), "within": own["seconds"].count()}
             lines.append(line | {"seconds": own["seconds"].median(), "times": own["times"].median()})
     return pd.DataFrame(lines).sort_values(["solver", "measured"]) if lines else pd.DataFrame()

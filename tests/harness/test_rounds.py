@@ -219,3 +219,24 @@ def test_the_last_iterate_of_what_stops_by_itself_is_judged(suite: Suite, tmp_pa
     assert (report["status"], report["iterations"]) == ("time_limit", 7)
     assert report["message"] == f"stopped by itself after {OWN_LIMIT * 0.01:g} s, with its last iterate"
     assert (tmp_path / str(report["answer"])).is_file()
+
+
+def test_a_plug_in_over_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each state of its file is a version, in the order of their minutes; beside the textbook's method."""
+    solvers = '[[solver]]\nname = "textbook-active-set"\nbeside = true\n[[solver]]\nname = "exact"\n'
+    path, out = tiny_joint.write_suite(tmp_path, solvers), tmp_path / "out"
+    for minute in (31, 32, 33):
+        clock = Clock(timedelta())
+        clock.time += timedelta(hours=10, minutes=minute)
+        monkeypatch.setattr("harness.measurement.task.datetime", clock)
+        with (tmp_path / "exact.py").open("a") as file:
+            file.write(f"# {minute}\n")
+        assert suite_run.run(read_suite(str(path)), out, Console(file=StringIO())) == 0
+    section = history.section(read_results(out))
+    assert section is not None
+    lines = shown(next(block for block in section.blocks if isinstance(block, Table)))[1:]
+    assert [line[:1] + line[2:5] for line in lines] == [
+        ["exact", f"2026-01-01T10:{minute}", "1", "1"] for minute in (31, 32, 33)
+    ]
+    assert len({line[1] for line in lines}) == 3
+    assert all(float(line[-1]) > 0 for line in lines)
