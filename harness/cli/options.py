@@ -87,11 +87,7 @@ Scheduler = Annotated[
 
 
 Share = Annotated[
-    float | None, option("SHARE", "Of the cases that must keep the gap.  [default: 0.95]", min=0.01, max=1.0)
-]
-ShareOfCases = Annotated[
-    float | None,
-    option("SHARE", "Of the cases that must keep the limits.  [default: 0.95; of one, 1]"),
+    float | None, option("SHARE", "Of the cases that must keep the limits.  [default: 0.95; of one, 1]")
 ]
 Resolution = Annotated[float | None, option("SHARE", "Of the range that is told apart.  [default: 0.01]")]
 

@@ -26,7 +26,7 @@ def place(
         float | None, option("MM", "Find the fewest fasteners that leave no larger gap.", min=0.0)
     ] = None,
     count: Annotated[int | None, option("N", "Find the best N fasteners instead.", min=1)] = None,
-    share: options.ShareOfCases = None,
+    share: options.Share = None,
     *,
     source: Callable[[], Any],
     scheduler: options.Scheduler = None,

@@ -26,7 +26,7 @@ def shim(
     allow_stress: Annotated[
         float | None, option("MPA", "The largest von Mises stress allowed, N/mm².")
     ] = None,
-    share: options.ShareOfCases = None,
+    share: options.Share = None,
     each: Annotated[
         bool, typer.Option("--each", help="Each case has shims of its own: what stock do all of them need?")
     ] = False,

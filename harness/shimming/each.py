@@ -5,8 +5,9 @@ from math import floor
 from typing import Any
 
 from harness.placement.answer_journal import AnswerJournal
-from harness.placement.fresh_cases import ALPHA, CONFIDENCE, Goal
+from harness.placement.fresh_cases import ALPHA, Goal
 from harness.placement.session import Outcome, PlanSession, Question
+from harness.scene.allowed_gap import CONFIDENCE, share_interval
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.reporter import Reporter
 from report.document.numbers import counted, out_of
@@ -35,8 +36,6 @@ def each_joint(
     journal: AnswerJournal, study: ShimStudy, goal: Goal, stock: tuple[float, ...], reporter: Reporter
 ) -> tuple[list[dict[str, Any]], list[Outcome], list[Outcome], str, bool]:
     """The joints, their outcomes without and with shims, the verdict in words, and whether it is PASS."""
-    from scipy.stats import binomtest  # slow to import
-
     limit, count, answers = goal.limit_mm or 0.0, study.cases.count, list[list[Outcome]]()
     for start in range(0, count, TOGETHER):
         some = range(start, min(start + TOGETHER, count))
@@ -48,9 +47,10 @@ def each_joint(
         for k, one in enumerate(after)
     ]
     kept, pieces = sum(one.largest[0] <= limit for one in after), sum(len(one.plan) for one in after)
-    listed = isinstance(study.cases, MeasuredGaps)  # of them alone
-    most = floor((1 - goal.share) * count + 1e-9) if listed else goal.failing(count, ALPHA)
-    low, high = binomtest(kept, count).proportion_ci(CONFIDENCE, "exact")
+    most = goal.failing(count, ALPHA)
+    if isinstance(study.cases, MeasuredGaps):  # there are no others
+        most = floor((1 - goal.share) * count + 1e-9)
+    low, high = share_interval(kept, count, method="exact")
     words = f"{out_of(kept, count, 'joint')} can be kept within the limits, {100 * kept / count:.1f} %"
     words += f" ({100 * CONFIDENCE:g} % interval {100 * low:.1f} to {100 * high:.1f} %), with"
     words += f" {counted(pieces, 'shim')} in all" if pieces else "out shims: none is needed"

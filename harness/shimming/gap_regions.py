@@ -41,9 +41,8 @@ def patches_of_gap(joint: AnyJoint, gap: Vector, limit_mm: float) -> tuple[Patch
 def _around(places: Matrix, over: Mask, among: Indices) -> Indices:
     """The contacts in the least rectangle around those that are over the limit."""
     some = places[among[over[among]]]
-    if not len(some):
-        return among[:0]
-    return among[((places[among] >= some.min(axis=0)) & (places[among] <= some.max(axis=0))).all(axis=1)]
+    low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
+    return among[((low <= places[among]) & (places[among] <= high)).all(axis=1)]
 
 
 def _divided(places: Matrix, y: Vector, limit_mm: float, region: Indices) -> list[Indices]:

@@ -114,8 +114,7 @@ def shim(
     share : float, optional
         Share of the load cases that must keep all limits; by default 0.95, of a single case 1.
     each : bool, optional
-        Whether each load case has shims of its own, of which the record says what to order; by default one
-        set of shims is found for all.
+        Whether each load case has shims of its own; by default all have the same.
     cases : GapCases, optional
         The load cases; by default 100 with random gaps, or the scene alone if its gaps are not random.
     scheduler : str, optional

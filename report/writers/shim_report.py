@@ -48,14 +48,13 @@ def write(directory: Path) -> Path:
             heads = [number("joints with it", "joints", whole), number("thickest, mm", "thickness_mm")]
             label, what = "joints", f"in how many of {counted(len(joints), 'joint')}"
             each = table.pivot(index="joint", columns="patch", values="thickness_mm")
-            files["joints"] = pd.DataFrame(joints).join(
-                each.rename(columns=dict(enumerate(patches["patch"]))), on="joint"
-            )
+            each.columns = pd.Index(patches["patch"][each.columns])
+            files["joints"] = pd.DataFrame(joints).join(each, on="joint")
             blocks += _stock(table.join(patches["area_mm2"], on="patch"))
         shims = patches[patches["thickness_mm"] > 0]
         ranges = [Column(f"{axis}, mm", partial(_range, axis)) for axis in "xy"]
         columns = [word("patch", "patch"), *ranges, *heads, *(number(*pair) for pair in COLUMNS.items())]
-        caption = "*All patches*; one without a thickness has no shim."
+        caption = "*Shims by patch*; one without a thickness has none."
         blocks.append(Table("shims", caption, patches.drop(columns="outline"), columns))
         if len(forces := pd.DataFrame(record["forces"])):
             of_forces = [word("kind", "kind"), *(number(*pair) for pair in FORCES.items())]
@@ -77,10 +76,7 @@ def write(directory: Path) -> Path:
     }
     write_page(directory / "index.html", title, data)
     sure = [f"Largest gap: {_largest(record, 'gap', len(shims))}.", *(f"{text}." for text in record["sure"])]
-    tables = [
-        replace(table, data=shims, caption="*The shims.*") if table.name == "shims" else table
-        for table in tables
-    ]
+    tables = [replace(table, data=shims) if table.name == "shims" else table for table in tables]
     about = sure, origin(record), record["inputs"], [picture], tables
     write_sheet(directory / "sheet.pdf", Sheet(title, kind, record["said"], *about))
     return page
@@ -109,15 +105,16 @@ def _largest(record: dict[str, Any], key: str, shims: int) -> str:
     before, after = (f"{significant(record[when][key])} {unit}" for when in ("before", "after"))
     chose, fresh = (" in the cases that chose", " in the fresh cases") if record["samples"] else ("", "")
     at = f", at {record['worst_at']}" if key == "gap" else ""
-    both = f"{before}{chose}, {after}{fresh}" if fresh else after
-    both = f"{before} without shims{chose}, {after} with them{fresh}" if shims else both
+    if shims:
+        before, after = f"{before} without shims", f"{after} with them"
+    both = f"{before}{chose}, {after}{fresh}" if shims or fresh else after
     return f"{both}{at}; {record[name]:g} {unit} allowed"
 
 
 def _stock(pieces: pd.DataFrame) -> list[Block]:
     """What to order: how many pieces of each thickness all joints take. pieces : one line each."""
-    columns = {"pieces": ("joint", "size"), "joints": ("joint", "nunique"), "area_mm2": ("area_mm2", "sum")}
-    table = pieces.groupby("thickness_mm").agg(**columns).reset_index()
+    of = {"pieces": ("joint", "size"), "joints": ("joint", "nunique"), "area_mm2": ("area_mm2", "sum")}
+    table = pieces.groupby("thickness_mm").agg(**of).reset_index()
     drawing = style.figure(2.6)
     axes = drawing.subplots()
     axes.bar(table["thickness_mm"].map("{:g}".format), table["pieces"], color=style.BLUE)
