@@ -99,7 +99,8 @@ def read(directory: Path) -> Series:
     nodes, fasteners = contacts.get("contact_nodes"), contacts.get("fasteners", np.zeros((0, 2)))
     gaps = series_file.StoredGaps(directory, int(contacts["m"]))
     made = pd.DataFrame(quoted(list(map(list, code.values()))), columns=["commit", "clean"])
-    tension = np.array([forces[case] for case in cases["case"]], dtype=float).reshape(len(cases), -1)
+    shape = len(cases), len(next(iter(forces.values()), ()))
+    tension = np.array([forces[case] for case in cases["case"]], dtype=float).reshape(shape)
     counts = quoted(Counter(verdicts.values()))
     return Series(facts, counts, cases, gaps, nodes, fasteners, swept, made, tension)
 

@@ -9,7 +9,7 @@ import pytest
 from synthetic_series import CASES, M, made
 
 from harness.results import series_file
-from report.results.series_results import QUANTILES, Series, convergence, exceedance, quantile_maps, read
+from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
 from report.writers.series_report import _swept, write
 
 
@@ -44,7 +44,7 @@ def test_the_interval_of_a_quantile_covers_it_as_often_as_it_says(tmp_path: Path
     hits = 0
     for _ in range(50):
         cases = pd.DataFrame({"max_gap_mm": rng.uniform(size=100)})
-        found = convergence(Series({}, {}, cases, series.gaps, None, series.fasteners, [], series.code))
+        found = convergence(replace(series, cases=cases))
         row = found[(found["cases"] == 100) & (found["quantile"] == 0.5)].iloc[0]
         ordered = np.sort(cases["max_gap_mm"])
         assert (row["low_mm"], row["high_mm"]) == (ordered[39], ordered[60])
