@@ -213,7 +213,7 @@ def test_each_joint_has_shims_of_its_own(
 
 
 @pytest.mark.parametrize(
-    ("failing", "share"), [(0, 0.95), (1, 0.95), (4, 0.95), (5, 0.95), (9, 0.9), (1, 1.0)]
+    ("failing", "share"), [(0, 0.95), (3, 0.95), (4, 0.95), (10, 0.95), (11, 0.95), (9, 0.9), (1, 1.0)]
 )
 def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, share: float) -> None:
     """By another implementation of the interval; of a table of joints the share itself counts."""
