@@ -1,5 +1,6 @@
 """Plates of another code: Argyris triangles of scikit-fem, their deflections and curvatures at points."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,25 +24,29 @@ def bending(u: Any, v: Any, w: Any) -> Any:
     return ddot((1 - w.poisson) * kappa + w.poisson * eye(trace(kappa), 2), dd(v))
 
 
-def held(joint: Joint, part: Part, side: float) -> tuple[Any, sp.csr_array, NDArray[np.intp]]:
-    """Basis and K, N/mm, of a part, two triangles per square of a side, mm; what is free beside its clamped
-    edges.
-    """
-    south = -part.south.length if part.south else 0.0
-    north = joint.junction.width + (part.north.length if part.north else 0.0)
+@cache
+def plate(length: float, south: float, north: float, side: float, poisson: float) -> tuple[Any, sp.csr_array]:
+    """Basis and K of rigidity one, two triangles per square of a side, mm."""
     x, y = (
         np.linspace(*ends, round((ends[1] - ends[0]) / side) + 1) / UNIT
-        for ends in ((0.0, joint.junction.length), (south, north))
+        for ends in ((0.0, length), (south, north))
     )
     basis = skfem.Basis(skfem.MeshTri.init_tensor(x, y), skfem.ElementTriArgyris(), intorder=8)
+    return basis, sp.csr_array(bending.assemble(basis, poisson=poisson) / UNIT**2)
+
+
+def held(joint: Joint, part: Part, side: float) -> tuple[Any, sp.csr_array, NDArray[np.intp]]:
+    """Basis and K, N/mm, of a part in triangles of a side, mm; what is free beside its clamped edges."""
+    south = -part.south.length if part.south else 0.0
+    north = joint.junction.width + (part.north.length if part.north else 0.0)
+    basis, K = plate(joint.junction.length, south, north, side, part.poisson)
     rigidity = part.young * part.thickness**3 / 12 / (1 - part.poisson**2)
-    K = sp.csr_array(bending.assemble(basis, poisson=part.poisson) * (rigidity / UNIT**2))
     fixed = np.zeros(basis.N, dtype=bool)
     for edge in part.clamped:
         line = {"south": south, "north": north}[edge] / UNIT
         facets = basis.mesh.facets_satisfying(lambda p, line=line: np.isclose(p[1], line))
         fixed[basis.get_dofs(facets).all(CLAMPED)] = True
-    return basis, K, np.flatnonzero(~fixed)
+    return basis, rigidity * K, np.flatnonzero(~fixed)
 
 
 def deflections(basis: Any, points: Array) -> sp.csr_array:

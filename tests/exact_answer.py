@@ -62,14 +62,23 @@ def whole(values: Any, one: int) -> Any:
     return numbers.reshape(np.shape(values))
 
 
+def times(M: Any, v: Any, one: int) -> Any:
+    """`one` times Mv, v of whole numbers."""
+    rows, columns = np.nonzero(M)
+    sums = np.zeros(len(M), dtype=object)
+    np.add.at(sums, rows, whole(M[rows, columns], one) * v[columns])
+    return sums
+
+
 def is_exact(made: ManufacturedProblem) -> bool:
     """Kx + Aλ = f, K = Kᵀ, λ ≥ 0, y = g − Aᵀx ≥ 0 and λy = 0, in whole numbers."""
-    K, others = made.assembly.K, (made.assembly.A.toarray(), made.x, made.lam, made.load.f, made.load.g)
-    numbers = np.concatenate([np.ravel(v) for v in (*K.matrices, *others)])
+    K, A = made.assembly.K, made.assembly.A.toarray()
+    others = made.x, made.lam, made.load.f, made.load.g
+    numbers = np.concatenate([np.ravel(v) for v in (*K.matrices, A, *others)])
     one = 2 ** max(0, 53 - int(np.frexp(numbers[numbers != 0])[1].min()))  # of which all are multiples
-    A, x, lam, f, g = (whole(values, one) for values in others)
-    Kx = np.concatenate([whole(M, one) @ x[rows] for M, rows in zip(K.matrices, K.slices, strict=True)])
-    y = g * one - A.T @ x
+    x, lam, f, g = (whole(values, one) for values in others)
+    Kx = np.concatenate([times(M, x[rows], one) for M, rows in zip(K.matrices, K.slices, strict=True)])
+    y = g * one - times(A.T, x, one)
     symmetric = all((M == M.T).all() for M in K.matrices)
-    balanced = (Kx + A @ lam == f * one).all()
+    balanced = (Kx + times(A, lam, one) == f * one).all()
     return bool(symmetric and balanced and (lam >= 0).all() and (y >= 0).all() and not (lam * y).any())

@@ -28,7 +28,7 @@ from solvers.registry import make_solver
 
 EFFECTS = Path(__file__).parents[2] / "docs" / "effects.md"
 NAMES = ["gallery/three-part-stack", "docs/effects.md", *(["gallery/measured-gap"] if ASKED else [])]
-ELEMENT = 25.0  # mm, the side of a triangle; the scenes have a node every 15 mm
+ELEMENT = 28.0  # mm, the side of a triangle; the scenes have a node every 15 mm
 
 
 def scene_named(name: str) -> JointScene:

@@ -1,6 +1,6 @@
 """Every solver on random small problems whose answer is known in rational numbers.
 
-All but ours are tried on every third. RIVETBENCH_LONG=1 takes thousands of them, and tries all on each.
+All but ours are tried on every fifth. RIVETBENCH_LONG=1 takes thousands of them, and tries all on each.
 """
 
 import numpy as np
@@ -41,7 +41,7 @@ def problem(seed: int, pairs: int, tools: int) -> tuple[Prepared, LoadCase]:
 
 
 @example(seed=504, pairs=0, tools=1)
-@settings(max_examples=7000 if LONG else 50, deadline=None, database=None, derandomize=not LONG)
+@settings(max_examples=7000 if LONG else 30, deadline=None, database=None, derandomize=not LONG)
 @given(seed=st.integers(0, 2**32 - 1), pairs=st.integers(0, 5), tools=st.integers(0, 3))
 def test_every_solver_finds_the_rational_answer(seed: int, pairs: int, tools: int) -> None:
     prepared, case = problem(seed, pairs, tools if pairs else tools + 1)
@@ -49,7 +49,7 @@ def test_every_solver_finds_the_rational_answer(seed: int, pairs: int, tools: in
     x = np.array(exact, dtype=float)
     lam = np.zeros(prepared.assembly.m)
     lam[active] = forces
-    for name, form in CASES if LONG or seed % 3 == 0 else IN_HOUSE:
+    for name, form in CASES if LONG or seed % 5 == 0 else IN_HOUSE:
         answer, found = solve(name, form, prepared, case)
         assert answer.status == "solved" or (name, form) not in IN_HOUSE
         if answer.status == "solved":

@@ -161,6 +161,7 @@ def test_maps_that_do_not_fit_are_named(tmp_path: Path, monkeypatch: pytest.Monk
     assert {"4386/0100", "11308/2500"} <= set(maps["left_out"])
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_series_has_its_quantiles_its_worst_case_and_a_curve_for_each_contact(tmp_path: Path) -> None:
     gaps = made_series(tmp_path)
     write_series(tmp_path)

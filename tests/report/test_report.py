@@ -102,6 +102,7 @@ def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> N
     assert math.isnan(cells.loc[HIGH, "load_case_s"])
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
     rows = [row(LOW, "a", machine=name, **times(solve_s=t)) for name, t in (("First", 1.0), ("Second", 9.0))]
     text = write(write_rows(tmp_path, rows)).read_text("utf-8")
@@ -111,6 +112,7 @@ def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
     assert own["load_case_s_4386"].tolist() == pytest.approx([9.0])
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
     text = write(tiny).read_text("utf-8")
     shown = re.findall(r"\[CSV\]\(([^)]+)\)\)\n\n((?:\|.*\n)+)", text)
@@ -130,6 +132,7 @@ def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
     assert re.search(r"\| c \(dual\) .* time limit .* > 60 s \(time limit\) \|", text)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_what_is_damaged_or_mixed_is_said(tmp_path: Path) -> None:
     rows = [row(LOW, "a", solver_version="1.0"), row(HIGH, "a", solver_version="1.1", threads=1)]
     write_rows(tmp_path, rows)

@@ -113,6 +113,7 @@ def test_the_report_keeps_many_drawn_scenes_apart(tmp_path: Path, monkeypatch: p
     assert pd.read_csv(tmp_path / "report" / "drawn.csv")["n"].to_list() == [4386] * 4 + [6112]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_nothing_but_failures_is_a_section_too(tmp_path: Path) -> None:
     rows = [row | no_answer("not_run") for row in every_row()]
     write(write_rows(tmp_path, [*rows, every_row()[0] | {"n": None, "scene": "drawn/"}]))

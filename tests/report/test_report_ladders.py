@@ -95,6 +95,7 @@ def test_what_the_model_refuses_is_listed_and_not_awaited(report: Path) -> None:
     assert "not finished" not in text
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_rungs_and_scenes_are_reported_apart(report: Path, tmp_path: Path) -> None:
     text = report.read_text("utf-8")
     assert re.findall("^## (.*)", text, re.M) == [

@@ -50,6 +50,7 @@ def test_rows_of_the_code_that_draws_call_for_no_warning(tmp_path: Path) -> None
     assert said(tmp_path, row(LOW, "a", commit=HERE, clean=True), row(LOW, "b", commit=HERE)) == []
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_rows_of_different_code_in_one_table_are_said_first(tmp_path: Path) -> None:
     rows = [row(LOW, "a", commit=HERE, clean=True), row(HIGH, "a", commit=OTHER, clean=False), row(LOW, "b")]
     mixed, unclean, older = said(tmp_path, *rows)
@@ -72,6 +73,7 @@ def test_rows_of_older_code_and_of_an_unknown_commit_are_said(tmp_path: Path) ->
     assert installed == older
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_different_code_of_one_solver_is_said(tmp_path: Path) -> None:
     rows = [row(LOW, "a", commit=HERE, solver_code="one"), row(HIGH, "a", commit=HERE, solver_code="two")]
     rows += [row(LOW, "b", commit=HERE, solver_code="three")]
@@ -80,6 +82,7 @@ def test_different_code_of_one_solver_is_said(tmp_path: Path) -> None:
     assert re.search(r"\| a +\| 1.0 +\| one and two +\|", text)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_report_of_the_same_code_is_the_same_bytes(tmp_path: Path) -> None:
     directory = write_rows(tmp_path, [row(LOW, "a", commit=OTHER), row(HIGH, "a", commit=OTHER)])
     first = write(directory).read_bytes()

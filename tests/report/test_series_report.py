@@ -85,6 +85,7 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         assert ("initial_gap.mean changes neither" in figure.caption) is said
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_series_without_nodes_has_no_map(tmp_path: Path) -> None:
     made(tmp_path)
     series_file.write_contacts(tmp_path, {"m": np.array(M)})

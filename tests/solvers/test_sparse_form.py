@@ -32,6 +32,7 @@ GALLERY = [
     name
     for name in scene_names()
     if name.startswith("gallery/") and (read_scene(name).expected_size or (0, 0))[1] > 0
+    if name != "gallery/riveted-from-one-end"  # in another order: the same K
 ]
 
 
