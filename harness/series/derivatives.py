@@ -20,6 +20,7 @@ from problems.load_cases.random_inputs import RandomInputs
 from .session import Job
 
 STEP = 1e-3  # of the interquartile range
+ROUNDING = 1e-12  # of the largest: a smaller rate is 0
 
 
 def derivatives(job: Job) -> dict[str, list[Any]]:
@@ -45,6 +46,7 @@ def derivatives(job: Job) -> dict[str, list[Any]]:
         Q, b = K.compliance(closed), closed.T @ free - dg[C]
         dlam = linalg.lstsq(Q, b)[0] if data.assembly.dependent else linalg.solve(Q, b, assume_a="pos")
     dy, y = (dg - A.T @ (free - K.solve(closed @ dlam)))[~C], (load.g - A.T @ answer.x)[~C]
+    dy = np.where(abs(dy) > ROUNDING * abs(dy).max(axis=0, initial=0.0), dy, 0.0)
     largest = dy[y.argmax()] if len(y) else np.zeros(len(means))
     margin = np.concatenate([answer.lam[C], y, y.max(initial=0.0) - y])[:, None]
     rate = np.vstack([dlam, dy, largest - dy])
