@@ -17,23 +17,27 @@ from problems.load_cases.random_inputs import RandomInputs
 from problems.scene_files import read_scene
 
 LAWS = (
-    "initial_gap.mean=normal(0.3, 0.01)",
+    "initial_gap.mean=normal(0.2, 0.01)",
     "fasteners.preload=each normal(60, 5)",
     "pressure.value=normal(3e-4, 2e-5)",
     "fasteners.points.x=uniform(-8, 14)",
+    "part_position.shift=normal(0, 1e-3)",
+    "part_position.slope_x=normal(0, 1e-5)",
 )
+RIBS = '[[effect]]\nkind = "ribs"'
+POSITION = '[[effect]]\nkind = "part_position"\npart = "a"\n'
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_differences_of_answers(tmp_path: Path, form: Form) -> None:
     """Linear between the two ends; just beyond, contacts or the place of the largest gap are others."""
-    scene = read_scene(str(write_strip(tmp_path)))
+    scene = read_scene(str(write_strip(tmp_path, (RIBS, POSITION + RIBS))))
     cases = GapCases(random=LAWS).of(scene, form)
     assert isinstance(cases, RandomInputs)
     found, data = derivatives(Job(scene=scene, cases=cases, form=form)), prepared(scene, form=form)
     assert found["input"] == [law.partition("=")[0] for law in LAWS]
-    means = np.array([0.3, 60.0, 3e-4, -1.0])
-    np.testing.assert_allclose(found["mean"], means, rtol=1e-12)
+    means = np.array([0.2, 60.0, 3e-4, -1.0, 0.0, 0.0])
+    np.testing.assert_allclose(found["mean"], means, rtol=1e-12, atol=1e-15)
 
     def answer(i: int, value: float) -> tuple[float, tuple[object, ...]]:
         load = cases.load_at([*means[:i], value, *means[i + 1 :]])
@@ -44,7 +48,10 @@ def test_differences_of_answers(tmp_path: Path, form: Form) -> None:
     largest, at_mean = answer(0, means[0])
     assert 5 < sum(at_mean[1:]) < 40
     slopes = np.array(found["derivative"])
-    np.testing.assert_allclose(found["per_sd_mm"], slopes * [0.01, 5, 2e-5, 14 / 12**0.5], rtol=1e-9)
+    np.testing.assert_allclose(
+        found["per_sd_mm"], slopes * [0.01, 5, 2e-5, 14 / 12**0.5, 1e-3, 1e-5], rtol=1e-9
+    )
+    assert slopes[4] == pytest.approx(-slopes[0], rel=1e-9)
     for i, slope in enumerate(slopes):
         for end, side in ((found["low"][i], -1), (found["high"][i], 1)):
             room = (end - means[i]) if np.isfinite(end) else side * abs(means[i])

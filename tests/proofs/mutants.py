@@ -279,6 +279,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "np.vstack([dlam, dy, largest - dy])": (
             "np.vstack([0 * dlam, dy, largest - dy])",
             "np.vstack([dlam, 0 * dy, largest - dy])",
+            "np.vstack([dlam, dy, 0 * dy])",
         ),
     },
     "problems/load_cases/random_inputs.py": {
