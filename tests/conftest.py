@@ -11,6 +11,7 @@ import pytest
 from forked_processes import fork_measuring_processes
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
+ON_WORKERS = ("harness.measurement.task", "harness.placement.session", "harness.series.executors")
 
 if DISTRIBUTED:  # a thread for each process; read when numpy is loaded
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -35,9 +36,20 @@ def _forked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Answers and series are written without them: they take longer than all the rest."""
+    """Answers have none, all else a blank one: they take longer than all the rest."""
+    from matplotlib.image import imsave
+
+    def blank(_: object, file: Path, **__: Any) -> None:
+        imsave(file, [[(1.0, 1.0, 1.0)] * 40] * 30, format="png")
+
     monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", blank)
+
+
+@pytest.fixture
+def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A series writes its rows and gaps alone."""
+    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
 
 
 @pytest.fixture(scope="session")
@@ -57,14 +69,17 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def cluster() -> Iterator[Any]:
-    """Two workers of Dask; a task that kills two is left. Dask sets nothing in the environment here."""
+    """Two workers of Dask; a task that kills two is left. Dask sets nothing in the environment here.
+
+    They and those that follow them are forked from a process that has imported what they need.
+    """
     dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
-    settings = {"distributed.scheduler.allowed-failures": 1, "distributed.nanny.pre-spawn-environ": {}}
-    with (
-        dask.config.set(settings),
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made,
-    ):
-        yield made
+    settings = {"scheduler.allowed-failures": 1, "nanny.pre-spawn-environ": {}}
+    settings |= {"worker.multiprocessing-method": "forkserver"}
+    with dask.config.set({f"distributed.{name}": value for name, value in settings.items()}):
+        distributed.utils.get_mp_context().set_forkserver_preload(["distributed", *ON_WORKERS])
+        with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
+            yield made
 
 
 @pytest.fixture

@@ -47,16 +47,6 @@ def environment(folder: Path) -> dict[str, str]:
     return {**os.environ, "RIVETBENCH_CACHE": str(folder / "cache")}
 
 
-def harness(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command, which must end, soon with all its processes, and without a traceback."""
-    done = subprocess.run(
-        command(*arguments), cwd=ROOT, env=environment(folder), capture_output=True, text=True, timeout=120
-    )
-    assert "Traceback" not in done.stdout + done.stderr
-    assert all_end(folder / "cache")
-    return done
-
-
 def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> None:
     """Once the command has made the file `begun`, the signal ends it and all that it started, with words."""
     going = subprocess.Popen(

@@ -29,11 +29,7 @@ from problems.stiffness.operator import Stiffness
 PAIRS = [{"pair": ["a", "b"], "start": 0, "stop": 2}, {"pair": ["b", "tool"], "start": 2, "stop": 4}]
 CASES = 12
 
-
-@pytest.fixture(autouse=True)
-def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
-    monkeypatch.setattr("report.writers.series_report._maps", lambda *_: [])
+pytestmark = pytest.mark.usefixtures("without_pictures")
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from commands import harness
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
 COMMANDS = [
     "solve gallery/sheet-over-former --out OUT",
     "export gallery/sheet-over-former --format npz --out OUT/scene.npz",

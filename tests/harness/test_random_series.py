@@ -30,6 +30,7 @@ def rows_of(directory: Path) -> list[dict[str, object]]:
     return [{key: row[key] for key in row if key not in timed} for row in series_file.rows(directory)]
 
 
+@pytest.mark.usefixtures("without_report")
 def test_the_table_of_a_scene_and_its_options_are_drawn(scene: Path, tmp_path: Path) -> None:
     more = "--random", "pressure.value=norm(1e-4, 1e-6)", "--allow-gap", 0.4
     for out, counts in (("once", (9,)), ("twice", (4, 9))):
@@ -86,6 +87,7 @@ def test_random_keys_do_not_go_through_stages(scene: Path, tmp_path: Path) -> No
     assert "has stages" in done.output
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_sweep_leaves_the_table_out(scene: Path, tmp_path: Path) -> None:
     done = harness("series", scene, "--sweep", "initial_gap.mean=0.2,0.4", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output

@@ -28,7 +28,7 @@ from problems.forms.problem import Dual
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
 COMMAND = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -44,12 +44,6 @@ def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
         (folder / "slow.py").write_text(SLOW)
         patch.chdir(folder)
         yield
-
-
-@pytest.fixture(autouse=True)
-def _no_report(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its pictures take most of the time, and are tested in test_series_report."""
-    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
 
 
 def series(*arguments: str, code: int = 0) -> Any:

@@ -35,6 +35,7 @@ from problems.model.scene import JointScene
 from problems.reporter import SILENT
 from problems.scene_files import read_scene
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
 RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
 STOCK = (0.02, 0.04, 0.08)
 

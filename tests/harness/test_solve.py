@@ -62,10 +62,7 @@ value = 1e-3
 """ + SCENE[SCENE.index("[joint]") :]
 
 
-@pytest.fixture(autouse=True)
-def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drawing takes most of the time: only for `solved`."""
-    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
+pytestmark = pytest.mark.usefixtures("without_pictures")  # but of `solved`
 
 
 def run(folder: Path, text: str = SCENE, solver: str | None = None, preload: float = 80.0) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from rivetbench import run_series, tolerance
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
 SD, FORCE = "initial_gap.random.sd", "fasteners.preload"
 LIMIT, CASES = 0.5, 12
 GRID = ("--allow-gap", LIMIT, "--cases", CASES, "--share", 0.7)

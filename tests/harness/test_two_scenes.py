@@ -135,14 +135,6 @@ def test_a_plane_gap_is_the_same_on_any_mesh(nodes: tuple[int, int], tmp_path: P
     assert "both are FAIL" in (tmp_path / "both" / "comparison.md").read_text()
 
 
-def test_a_scene_is_compared_with_itself(tmp_path: Path) -> None:
-    scene = write(tmp_path / "scene.toml", JOINT + FASTENERS)
-    assert harness("solve", scene, scene, "--out", tmp_path / "both").exit_code == 0
-    table = rows(tmp_path / "both" / "contacts.csv")
-    assert [float(row["change_mm"]) for row in table] == [0.0] * 45
-    assert [row["force_first_N"] for row in table] == [row["force_second_N"] for row in table]
-
-
 @pytest.mark.parametrize("turned", [False, True])
 def test_superelements_are_compared_where_both_have_contacts(turned: bool, tmp_path: Path) -> None:
     """Scattered nodes and a grid over the same square: a linear field is the same at all common places."""

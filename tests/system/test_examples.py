@@ -1,9 +1,13 @@
 """Each example prints the number that it is expected to; the solver template is a solver."""
 
 import runpy
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from commands import harness
 
 from solvers.base import Solver
 from solvers.plugin import load_plugin
@@ -25,9 +29,16 @@ def test_every_example_is_tested() -> None:
     assert sorted(path.stem for path in EXAMPLES.glob("*.py")) == sorted([*PRINTED, TEMPLATE.stem])
 
 
+def run_here(words: list[str], **_: Any) -> None:
+    """A command that an example starts, in this process."""
+    assert words[:3] == [sys.executable, "-m", "harness"]
+    assert harness(*words[3:]).exit_code == 0
+
+
 @pytest.mark.parametrize("name", PRINTED)
 def test_the_number(name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", [name])  # else a word of pytest's names its file
+    monkeypatch.setattr(subprocess, "run", run_here)
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     (line,) = capsys.readouterr().out.splitlines()
     assert float(line) == pytest.approx(PRINTED[name], rel=2e-6)

@@ -8,7 +8,6 @@ import pytest
 import tiny_joint
 from commands import harness
 from plugin_commands import THREAD, command, interrupt, write
-from plugin_commands import harness as outside
 from suite_runs import all_end, rows_of
 
 import harness.conformance.isolated as isolated
@@ -82,13 +81,15 @@ def test_an_endless_import_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         (f"{THREAD}; print('hello' * 10**6)", "os.fork() or (os.setsid(), time.sleep(60))"),
     ],
 )
+@pytest.mark.starts
+@pytest.mark.usefixtures("own_cache")
 def test_no_thread_or_fork_is_left_behind(tmp_path: Path, at_import: str, in_solve: str) -> None:
     plugin = write(tmp_path, at_import, in_solve)
-    done = outside(tmp_path, "check", "--plugin", plugin, "--time-limit", 20)
-    assert (done.returncode, done.stdout) == (0, "mine: no faults\n")
+    done = harness("check", "--plugin", plugin, "--time-limit", 20)
+    assert (done.exit_code, done.stdout) == (0, "mine: no faults\n")
     suite = tiny_joint.write_suite(tmp_path)
-    done = outside(tmp_path, "run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
-    assert done.returncode == 0
+    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
+    assert done.exit_code == 0
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 

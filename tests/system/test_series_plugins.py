@@ -4,16 +4,16 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from commands import harness
 from plugin_commands import command, interrupt, write
-from plugin_commands import harness as outside
 from strip_scene import write_strip
 from suite_runs import all_end
 
 from harness.results import series_file
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
 COUNTED = "self.count = getattr(self, 'count', 0) + 1\n        if self.count == 3: "
 MORE_MEMORY = "held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(60)"
@@ -21,9 +21,8 @@ MORE_MEMORY = "held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(
 
 @pytest.fixture(autouse=True)
 def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A cache that marks the processes of a test, which are to end; no report, whose pictures take long."""
+    """A cache that marks the processes of a test, which are to end."""
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
     yield
     assert all_end(tmp_path / "cache")
 
@@ -73,14 +72,13 @@ def test_a_preparation_that_hangs_ends(tmp_path: Path) -> None:
     assert "case 0: time_limit, no_answer: solve took more than 1 s" in done.output
 
 
-def test_on_workers_too(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    done = outside(
-        tmp_path, *series(tmp_path, in_solve="os._exit(7)"), "--cases", 2, "--scheduler", "local:1"
-    )
-    assert done.returncode == 3
-    assert "ended with exit code 7" in done.stdout
-    assert "2 no answer" in done.stdout
+def test_on_workers_too(tmp_path: Path, cluster: Any) -> None:
+    going = series(tmp_path, in_solve="os._exit(7)")
+    done = harness(*going, "--cases", 2, "--scheduler", cluster.scheduler_address)
+    assert done.exit_code == 3
+    assert "ended with exit code 7" in done.output
+    assert "2 no answer" in done.output
+    assert not any(psutil.Process(nanny.pid).children() for nanny in cluster.workers.values())
 
 
 def test_a_signal_ends_it_within_a_second(tmp_path: Path) -> None:
