@@ -38,6 +38,8 @@ def write(directory: Path) -> Path:
     record = quoted(json.loads((directory / "shim.json").read_text("utf-8")))
     patches, title = pd.DataFrame(record["patches"]), f"Shims: {record['title']}"
     label, what, heads = "thickness_mm", "thickness in mm", [number("thickness, mm", "thickness_mm")]
+    if "thickness_end_mm" in patches:
+        heads.append(number("at its other end, mm", "thickness_end_mm"))
     blocks, files = list[Block](), dict[str, pd.DataFrame]()
     with style.applied():
         if joints := record.get("joints"):
@@ -147,7 +149,8 @@ def _drawing(record: dict[str, Any], shims: pd.DataFrame, label: str) -> Drawing
         axes.add_patch(Polygon(outline, facecolor=style.SKY, edgecolor=style.BLUE))
         middle, (width, height) = outline.mean(axis=0), np.ptp(outline, axis=0)
         look: dict[str, Any] = {"ha": "center", "va": "center", "rotation": 90 if width < height else 0}
-        axes.text(middle[0], middle[1], f"{line['patch']}: {line[label]:g}", **look)
+        end = f" to {line['thickness_end_mm']:g}" if "thickness_end_mm" in line else ""
+        axes.text(middle[0], middle[1], f"{line['patch']}: {line[label]:g}{end}", **look)
     axes.plot(*np.reshape(record["marks"], (-1, 2)).T, "o", color=style.BLACK, fillstyle="none", ms=4)
     ends = np.concatenate([record["bounds"], *corners]).T
     for axis, places in zip((axes.xaxis, axes.yaxis), ends, strict=True):
