@@ -163,7 +163,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
 
 
 def _random(path: Path, name: str, value: object, faults: list[Fault]) -> Iterator[str]:
-    """Yield KEY=DISTRIBUTION of each entry of [random], also in tables within it; `series` reads them."""
+    """Yield KEY=DISTRIBUTION of each entry of [random], also in tables within it."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from _random(path, f"{name}.{key}".lstrip("."), inner, faults)

@@ -76,6 +76,10 @@ Scans = Annotated[
 Variance = Annotated[
     float | None, option("SHARE", "Of the scans' variance that the modes keep.  [default: 0.99]")
 ]
+Random = Annotated[
+    list[str] | None,
+    option("KEY=LAW", "A random key, as fasteners.preload='normal(1000, 100)'. Repeatable."),
+]
 Columns = Annotated[
     str | None,
     option("HEADINGS", "Headings of x, y and gap in FILE, as 'Pos X,Pos Y,Gap'.  [default: x,y,gap]"),
@@ -102,12 +106,13 @@ def _load_cases(
     gaps: Gaps = None,
     scans: Scans = None,
     variance: Variance = None,
+    random: Random = None,
     columns: Columns = None,
     missing: Missing = None,
 ) -> Any:
     from harness.series.load_case_source import GapCases
 
-    sources = around, gaps, table_options(columns, missing), (), None, scans, variance
+    sources = around, gaps, table_options(columns, missing), tuple(random or ()), None, scans, variance
     return GapCases(cases, seed, mean, sd, correlation_length, *sources)
 
 

@@ -28,10 +28,6 @@ def series(
     scene: SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
     source: Callable[[], Any],
-    random: Annotated[
-        list[str] | None,
-        option("KEY=LAW", "A random key, as fasteners.preload='normal(1000, 100)'. Repeatable."),
-    ] = None,
     sweep: Annotated[
         list[str] | None,
         option("KEY=VALUES", "A key of the scene and its values. Repeatable, for all combinations."),
@@ -106,7 +102,7 @@ def series(
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
-        cases = replace(source(), random=tuple(random or ()), contributors=contributors)
+        cases = replace(source(), contributors=contributors)
         settings = SeriesOptions(solver, form, *accuracy, threads, plugin, *limits)
         if find or share is not None or resolution:
             if sweep or not find or allow_gap is None:

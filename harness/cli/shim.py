@@ -26,6 +26,9 @@ def shim(
     allow_stress: Annotated[
         float | None, option("MPA", "The largest von Mises stress allowed, N/mm².")
     ] = None,
+    taper: Annotated[
+        bool, typer.Option("--taper", help="A thickness of the stock at each end of a patch's longer side.")
+    ] = False,
     share: options.Share = None,
     each: Annotated[
         bool, typer.Option("--each", help="Each case has shims of its own: what stock do all of them need?")
@@ -67,6 +70,7 @@ def shim(
             allow_stress=allow_stress,
             share=share,
             each=each,
+            taper=taper,
             cases=source(),
             scheduler=scheduler,
             reporter=ConsoleReporter(console, plain=True),

@@ -19,14 +19,13 @@ from harness.series.derivatives import derivatives
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
 from harness.series.session import Job, SeriesOptions
-from harness.series.staged import last_scene
 from harness.solving.call_lock import keeps_threads
 from harness.terminal import DONE, NOTHING_JUDGED
 from harness.terminal.console import console_of
 from problems.errors import Fault, InputError
 from problems.load_cases import LoadCases
 from problems.load_cases.sweep import sweep as swept
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import Scene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
@@ -119,10 +118,7 @@ def run_series(
     directory, solver = Path(out), options.solver
     refuse_unusable(allow_gap_mm)
     read = scene if isinstance(scene, Scene) else read_scene(str(scene))
-    if isinstance(read, JointScene) and not (sweep or cases.gaps or cases.scans):
-        told = {text.partition("=")[0] for text in cases.random}
-        in_scene = [text for text in read.random if text.partition("=")[0] not in told]
-        cases = replace(cases, random=(*in_scene, *cases.random))
+    cases = cases if sweep else replace(cases, random=cases.laws(read))
     faults = cases.faults(sweep)
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
@@ -139,16 +135,16 @@ def run_series(
     refuse_inputs([directory / SERIES], inputs)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
     wanted = options.form or (earlier if earlier in made.forms else None)
-    alien = [*sweep, *cases.random, *([str(options.plugin)] if options.plugin else [])]
+    alien = [*sweep, *([str(options.plugin)] if options.plugin else [])]
     if read.stages and alien:
-        where = "--sweep, --random, --plugin"
+        where = "--sweep, --plugin"
         raise InputError.one(where, "given", ", ".join(alien), f"left out: {read.name} has stages")
     count = swept(read, sweep).count if sweep else cases.count or RANDOM * (cases.contributors or 1)
     choice = chosen_form(read, made.forms, wanted, count)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
     chosen: LoadCases = (
-        swept(read, sweep, choice.form) if sweep else cases.of(last_scene(read), choice.form, stiffness=True)
+        swept(read, sweep, choice.form) if sweep else cases.of(read, choice.form, stiffness=True)
     )
     for sentence in (*read.unusual, *chosen.notes):
         reporter.say(sentence)

@@ -5,7 +5,6 @@ DIRECTORY/own, on the scenes as a user would read them.
 """
 
 import tomllib
-from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,16 +29,16 @@ from harness.scene.scene_file import MOVED, edited, with_fasteners
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
-from harness.series.staged import last_scene
 from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
-from problems.build import load_case, prepared
+from problems.build import prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
-from problems.load_cases import Listed, LoadCases
+from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
+from problems.load_cases.random_inputs import RandomInputs
 from problems.load_cases.scan_modes import ScanModes
 from problems.model.scene import JointScene, Scene
 from problems.reporter import SILENT, Reporter
@@ -146,17 +145,15 @@ def place(
         faults.append(Fault("--count", "N", count, f"at most {len(holes)}, the candidates"))
     if share is not None and not 0 < share <= 1:
         faults.append(Fault("--share", "share", share, "above 0, at most 1"))
+    moving = [law for law in cases.laws(movable.scene) if law.startswith("fasteners.")]
+    faults += [Fault("--random", "key", law, "left out: the fasteners change places") for law in moving]
     if faults:
         raise InputError(faults)
     (newton,) = described([("newton", {})], None, "--solver", reporter)
     number = 1 if single else cases.count or RANDOM
     form = chosen_form(movable.scene, newton.forms, None, number * len(holes)).form
-
-    def cases_of(scene: Scene) -> LoadCases:
-        last = last_scene(scene)
-        return Listed((load_case(last, form),)) if single else cases.of(last, form)
-
-    study = FastenerStudy(movable.bare, cases_of(movable.scene), form, movable)
+    within = movable.scene if movable.scene.stages else movable.bare
+    study = FastenerStudy(movable.bare, cases.of_search(within, form), form, movable)
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
     goal = Goal(allow_gap_mm, Goal.share_of(share, study.cases.count), count)
@@ -194,7 +191,7 @@ def place(
             if names:
                 table.insert(0, "name", [names.get(place, "") for place in plan])
             csv_frame(table).to_csv(directory / f"{name}.csv", index=False)
-            moved, made = _written_scene(directory / f"{name}.toml", study, law, cases_of, result)
+            moved, made = _written_scene(directory / f"{name}.toml", study, law, cases, result)
             job = Job(scene=moved, cases=made, form=form, check=0, threads=THREADS)
             run_series(job, facts, directory / name, console)
         words, passed = sentence_on(result, goal, nodes)
@@ -212,23 +209,24 @@ def _written_scene(
     path: Path,
     study: FastenerStudy,
     law: RandomGaps | None,
-    cases_of: Callable[[Scene], LoadCases],
+    source: GapCases,
     result: Found,
 ) -> tuple[Scene, LoadCases]:
     """The scene of a file that was written, and its load cases: those that decided, too."""
     scene = read_scene(str(path))
+    assert isinstance(scene, JointScene)
     if law is not None and law.points is not None:  # a scene has a scan, or random gaps around it
-        assert isinstance(scene, JointScene)
         others = without_fasteners(study.scene).effects
         scene = replace(scene, effects=(*others, *scene.effects_of(Fasteners)))
-    cases = cases_of(scene)
-    if result.samples and isinstance(cases, RandomGaps | ScanModes):
+    cases = source.of_search(scene, study.form)
+    if result.samples and isinstance(cases, RandomGaps | RandomInputs | ScanModes):
         cases = replace(cases, count=result.samples[-1].numbers[-1] + 1)
     return scene, cases
 
 
 def other_gaps(bare: JointScene, cases: LoadCases) -> RandomGaps | None:
     """The random gaps of the cases, unless the scene's file has the same."""
+    cases = cases.gaps or cases if isinstance(cases, RandomInputs) else cases
     if not isinstance(cases, RandomGaps):
         return None
     but = {"random": {"seed"}}

@@ -12,7 +12,7 @@ stage and load case: most contacts have the same state.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from uuid import uuid4
@@ -22,6 +22,8 @@ import scipy.sparse as sp
 import threadpoolctl
 
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
+from harness.scene.stress import sensitivities
+from harness.series.session import BLOCK, BLOCK_BYTES
 from harness.series.staged import OpenStage, OpenStages, StageCases
 from harness.solving.call_lock import in_turn
 from harness.verification.assess import Assessment, GapError, assess
@@ -30,11 +32,12 @@ from harness.verification.reference import proof_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms import Form
-from problems.forms.assembly import Assembly, DualLoadCase, Matrix, Vector
+from problems.forms.assembly import DualLoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
+from problems.load_cases.random_inputs import RandomInputs
 from problems.model.effect import Effect
 from problems.model.scene import JointScene
-from problems.model.stage_answers import Elongations, through
+from problems.model.stage_answers import Elongations, locked, through
 from solvers.algorithms.newton_sweeps import Case, Sweeps
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
@@ -65,10 +68,8 @@ class Study(ABC):
     def effect(self, item: Place) -> Effect:
         """What an item adds to the scene."""
 
-    def further(
-        self, assembly: Assembly, gap: Vector, x: Callable[[], Vector], error_mm: float
-    ) -> tuple[float, ...]:
-        """More figures of a case, from its gaps (m,) mm, no less than they can be, and x (n,) ± error_mm."""
+    def further(self, answer: "CaseAnswer") -> tuple[float, ...]:
+        """More figures of a case."""
         return ()
 
 
@@ -130,6 +131,11 @@ class StiffnessSession:
         self.columns: dict[Place, tuple[Vector, Vector, Vector]] = {}
         self.of_springs: dict[bytes, tuple[Matrix, Matrix]] = {}
 
+    @cached_property
+    def sensitivities(self) -> list[Vector]:
+        """Of the stresses of superelements; see `harness.scene.stress.sensitivities`."""
+        return sensitivities(self.study.bare, self.proof)
+
     def column(self, item: Place) -> tuple[Vector, Vector, Vector]:
         """f_z (n,) N, g_z and u_z (m,) mm."""
         if item not in self.columns:
@@ -150,19 +156,20 @@ class StiffnessSession:
 class StageAnswers:
     """The answers to load cases of one stage, made when they are needed.
 
-    near : those of another plan, from which these are estimated; None: these are accurate. locks : whether
-    fasteners have locked what these have reached.
+    approaches : of its springs, (r, k) mm. near : those of another plan in each case, from which these are
+    estimated; None: these are accurate. locks : whether fasteners have locked what these have reached.
     """
 
     session: StiffnessSession
     loads: list[DualLoadCase]
+    approaches: Matrix
     tolerance: float
     near: "StageAnswers | None" = None
     locks: bool = False
 
     @cached_property
     def cases(self) -> list[Case]:
-        starts = self.near.cases if self.near else ()
+        starts = self.near.cases * (len(self.loads) // len(self.near.cases)) if self.near else ()
         return self.session.sweeps.together(self.loads, self.tolerance, starts)
 
     @cached_property
@@ -183,6 +190,30 @@ class StageAnswers:
         return x.T @ np.column_stack([load.f for load in self.loads]) - overlap.T @ self.vectors[0]
 
 
+@dataclass(frozen=True)
+class CaseAnswer:
+    """The answer to a case after the last stage.
+
+    number : of the case. approaches : locked by the springs of the last stage, (r,) mm. lam : (m,) N. gap :
+    (m,) mm, no less than it can be. x : makes (n,) mm. bound_mm : proven error of x, 0 of an estimate.
+    """
+
+    session: StiffnessSession
+    number: int
+    approaches: Vector
+    load: DualLoadCase
+    lam: Vector
+    gap: Vector
+    x: Callable[[], Vector]
+    bound_mm: float
+
+    @property
+    def scene(self) -> JointScene:
+        """What acts in this case but the items, without stages."""
+        study = self.session.study
+        return study.cases.scene_of(self.number) or locked(study.bare, self.approaches)
+
+
 class PlanSession:
     """Answers questions of one study; its matrices are made once. last : of the last stage."""
 
@@ -190,38 +221,46 @@ class PlanSession:
         threadpoolctl.threadpool_limits(THREADS)
         self.study = study
         self.stages = OpenStages(study.bare, study.form, partial(StiffnessSession, study))
-        self.last = self.stages.of(study.bare).session
+        self.last, self.f = self.stages.of(study.bare).session, load_case(study.bare, study.form).f
         self.loads: dict[tuple[OpenStage[StiffnessSession], int], DualLoadCase] = {}
-        self.starts = lru_cache(4)(partial(self.answers, tolerance=ESTIMATE_MM))
+        self.starts = lru_cache(4)(lambda plan, numbers: self.answers([plan], numbers, ESTIMATE_MM))
+        self.block = min(BLOCK, max(BLOCK_BYTES // (8 * self.last.data.assembly.n), 1))
 
     def answer(self, question: Question) -> list[Outcome]:
         """The outcome of each plan, the same to the last bit whatever was answered before."""
-        starts = [] if question.base is None else self.starts(question.base, question.cases)
-        return [self._outcome(plan, question.cases, starts) for plan in question.plans]
+        plans, cases = question.plans, question.cases
+        starts = [] if question.base is None else self.starts(question.base, cases)
+        size = max(self.block // len(cases), 1)
+        blocks = (self._outcomes(plans[k : k + size], cases, starts) for k in range(0, len(plans), size))
+        return [outcome for block in blocks for outcome in block]
 
     def gaps(self, numbers: Sequence[int]) -> Matrix:
         """An estimate of the gaps (m, k) that no item leaves in some cases, mm."""
-        return self.answers((), numbers, ESTIMATE_MM)[-1].vectors[1]
+        return self.answers([()], numbers, ESTIMATE_MM)[-1].vectors[1]
 
-    def _outcome(self, plan: Plan, numbers: Sequence[int], starts: list[StageAnswers]) -> Outcome:
-        """starts : one for each stage of an estimate; none: it is proven."""
-        stages = self.answers(plan, numbers, ESTIMATE_MM if starts else TOLERANCE_MM, starts)
-        last, data, errors = stages[-1], self.last.data, np.zeros(len(numbers))
+    def _outcomes(
+        self, plans: Sequence[Plan], numbers: tuple[int, ...], starts: list[StageAnswers]
+    ) -> Iterator[Outcome]:
+        """starts : one for each stage of estimates; none: they are proven."""
+        stages = self.answers(plans, numbers, ESTIMATE_MM if starts else TOLERANCE_MM, starts)
+        last, data, errors = stages[-1], self.last.data, np.zeros(len(plans) * len(numbers))
+        lams, gaps = last.vectors
         if starts:
-            lams, gaps = last.vectors
             xs = [partial(data.recover, *pair) for pair in zip(lams.T, last.loads, strict=True)]
             bounds = [0.0] * len(xs)
         else:
             errors = self._errors(stages)
             xs = [partial(np.asarray, answer.x) for answer in last.proven]
             gaps, bounds = np.column_stack([a.gap for a in last.proven]), [a.bound_mm for a in last.proven]
-        largest = gaps.max(axis=0) + errors
-        mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
-        further = tuple(
-            filter(None, map(partial(self.study.further, data.assembly), (gaps + errors).T, xs, bounds))
-        )
-        at = gaps.argmax(axis=0)
-        return Outcome(tuple(largest.tolist()), tuple(at.tolist()), tuple(mean.tolist()), further)
+        largest, at = (gaps.max(axis=0) + errors).tolist(), gaps.argmax(axis=0).tolist()
+        mean = ((np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)).tolist()
+        shared = numbers * len(plans), last.approaches.T, last.loads, lams.T, (gaps + errors).T, xs, bounds
+        answers = (CaseAnswer(last.session, *of_case) for of_case in zip(*shared, strict=True))
+        further = list(map(self.study.further, answers))
+        for start in range(0, len(largest), len(numbers)):
+            own = slice(start, start + len(numbers))
+            figures = tuple(largest[own]), tuple(at[own]), tuple(mean[own])
+            yield Outcome(*figures, tuple(filter(None, further[own])))
 
     @staticmethod
     def _errors(stages: list[StageAnswers]) -> Vector:
@@ -235,40 +274,54 @@ class PlanSession:
         return np.where((np.array(bounds).reshape(-1, len(errors)) > LIMIT_MM).any(axis=0), np.inf, errors)
 
     def answers(
-        self, plan: Plan, numbers: Sequence[int], tolerance: float, starts: Sequence[StageAnswers] = ()
+        self,
+        plans: Sequence[Plan],
+        numbers: Sequence[int],
+        tolerance: float,
+        starts: Sequence[StageAnswers] = (),
     ) -> list[StageAnswers]:
-        """The answers of a plan in each problem of `through`; the last one is that of the last stage."""
+        """The answers in each problem of `through`, all cases of the first plan, all of the second, …; the
+        last ones are those of the last stage.
+        """
         made: list[StageAnswers] = []
 
         def solve(part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
-            session, loads = self._loads(part, plan, numbers, approaches)
-            made.append(StageAnswers(session, loads, tolerance, starts[len(made)] if starts else None))
+            session, loads = self._loads(part, plans, numbers, approaches)
+            near = starts[len(made)] if starts else None
+            made.append(StageAnswers(session, loads, approaches, tolerance, near))
             return made[-1].elongations, None
 
-        for _ in through(self.study.scene, solve, len(numbers)):
+        for _ in through(self.study.scene, solve, len(plans) * len(numbers)):
             pass
         return made
 
     def _loads(
-        self, part: JointScene, plan: Plan, numbers: Sequence[int], approaches: Matrix
+        self, part: JointScene, plans: Sequence[Plan], numbers: Sequence[int], approaches: Matrix
     ) -> tuple[StiffnessSession, list[DualLoadCase]]:
         """The load cases in a stage, a scene whose springs have approaches (r, k) mm, and the session."""
-        bare, items = self.study.bare_stage(part, plan)
-        stage = self.stages.of(bare)
-        session, cases = stage.session, StageCases(self.study.cases, stage.f, stage.gap_change, {})
+        bares, items = zip(*(self.study.bare_stage(part, plan) for plan in plans), strict=True)
+        stage, cases = self.stages.of(bares[0]), self.study.cases
+        session, K = stage.session, stage.session.data.assembly
         if new := [k for k in numbers if (stage, k) not in self.loads]:
-            made = session.data.with_p([cases.load(k) for k in new])
+            random = new if isinstance(cases, RandomInputs) else ()
+            of_stage = StageCases(
+                cases, stage.f, stage.gap_change, {k: cases.load(k).f - self.f for k in random}
+            )
+            made = session.data.with_p([of_stage.load(k) for k in new])
             self.loads |= {(stage, k): load for k, load in zip(new, made, strict=True)}
-        f, (g, u) = stage.f, np.zeros((2, session.data.assembly.m))
-        for item in items:
-            force, gap, overlap = session.column(item)
-            f, g, u = f + force, g + gap, u + overlap
-        forces = f[:, None] + stage.locking(session.data.assembly, approaches)
-        overlaps = np.repeat(u[:, None], len(numbers), axis=1)
+        locking, overlap = stage.locking(K, approaches), np.zeros((K.m, approaches.shape[1]))
         if stage.springs:
-            overlaps += session.springs(stage.springs.T)[1] @ (stage.springs.k[:, None] * approaches)
-        loads = zip(forces.T, overlaps.T, (self.loads[stage, k] for k in numbers), strict=True)
-        return session, [DualLoadCase(f, load.g + g, load.p + u) for f, u, load in loads]
+            overlap = session.springs(stage.springs.T)[1] @ (stage.springs.k[:, None] * approaches)
+        loads, columns = list[DualLoadCase](), zip(locking.T, overlap.T, strict=True)
+        for some in items:
+            f, (g, u) = np.zeros(K.n), np.zeros((2, K.m))
+            for item in some:
+                force, gap, change = session.column(item)
+                f, g, u = f + force, g + gap, u + change
+            for k, (of_springs, p) in zip(numbers, columns, strict=False):
+                load = self.loads[stage, k]
+                loads.append(DualLoadCase(load.f + f + of_springs, load.g + g, load.p + (u + p)))
+        return session, loads
 
 
 _sessions: dict[str, PlanSession] = {}  # the only one of this process, so that it opens the assembly once

@@ -1,4 +1,4 @@
-"""Where the load cases of `series` and `place` come from: random gaps, scans, or a table of measured gaps."""
+"""Where the load cases of `series`, `place` and `shim` come from: random gaps and keys, scans, or a table."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,16 +6,19 @@ from glob import glob
 from itertools import chain
 from pathlib import Path
 
+from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
-from problems.errors import Fault
+from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.input.tables import AS_NAMED, TableOptions
-from problems.load_cases import LoadCases
+from problems.load_cases import Listed, LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.random_inputs import random_inputs
 from problems.load_cases.scan_modes import VARIANCE, scan_modes
 from problems.model.scene import JointScene, Scene
+
+from .staged import last_scene
 
 RANDOM = 100  # cases, if no number is given
 
@@ -41,7 +44,7 @@ class GapCases:
         Headings of the scan's columns x, y and gap, and marks of missing gaps.
     random : tuple of str, optional
         KEY=DISTRIBUTION, keys of the scene that are random, as "fasteners.preload=each normal(1000, 100)",
-        in a series also of K, as "ribs.I=8 of normal(2000, 100)".
+        beside those of its table [random]; in a series also of K, as "ribs.I=8 of normal(2000, 100)".
     contributors : int, optional
         Number N of base points, a power of 2: the cases are the N (d + 2) that show what d inputs contribute.
     scans : str, optional
@@ -98,15 +101,33 @@ class GapCases:
         return faults
 
     def are_one(self, scene: JointScene) -> bool:
-        """Whether a search on this scene has one case, the scene itself: its gaps are not random."""
-        random = any(gap.random for gap in scene.effects_of(InitialGap))
+        """Whether a search on this scene has one case, the scene itself: nothing of it is random."""
+        random = scene.random or any(gap.random for gap in scene.effects_of(InitialGap))
         return replace(self, options=AS_NAMED) == DEFAULT and not random
 
-    def of(self, scene: Scene, form: Form, stiffness: bool = False) -> LoadCases:
-        """The load cases of a scene. stiffness : whether keys may change K.
+    def of_search(self, scene: JointScene, form: Form) -> LoadCases:
+        """The load cases of a search on a scene, whose figures need cases that are drawn independently."""
+        if self.contributors is not None:
+            allowed = "left out: the cases of contributors are not independent"
+            raise InputError.one("--contributors", "base points", self.contributors, allowed)
+        return Listed((load_case(last_scene(scene), form),)) if self.are_one(scene) else self.of(scene, form)
 
-        Raises InputError, as `measured_gaps` and `random_gaps` do.
+    def laws(self, scene: Scene) -> tuple[str, ...]:
+        """`random`, and the entries of a scene's [random] for other keys; measured gaps leave these out."""
+        told = {text.partition("=")[0].strip() for text in self.random}
+        table = () if self.gaps or self.scans or not isinstance(scene, JointScene) else scene.random
+        return (*(text for text in table if text.partition("=")[0] not in told), *self.random)
+
+    def of(self, scene: Scene, form: Form, stiffness: bool = False) -> LoadCases:
+        """The load cases of a scene, of one with stages those of the last. stiffness : whether keys may
+        change K.
+
+        Raises InputError, as `measured_gaps` and `random_gaps` do; or if random keys would go through stages.
         """
+        if (random := self.laws(scene)) and scene.stages:
+            allowed = f"left out: {scene.name} has stages"
+            raise InputError([Fault("--random", "key", text, allowed) for text in random])
+        scene = last_scene(scene)
         if self.gaps:
             return measured_gaps(scene, self.gaps, self.count, form, self.options)
         if self.scans:
@@ -115,11 +136,11 @@ class GapCases:
         law, gaps = (self.mean, self.sd, self.correlation_length), None
         count, seed = self.count or RANDOM, self.seed or 0
         fields = scene.effects_of(InitialGap) if isinstance(scene, JointScene) else ()
-        if not self.random or self.around or law != (None, None, None) or any(one.random for one in fields):
+        if not random or self.around or law != (None, None, None) or any(one.random for one in fields):
             gaps = random_gaps(scene, count, seed, *law, form, self.around, self.options)
-        if gaps and not self.random:
+        if gaps and not random:
             return gaps
-        return random_inputs(scene, self.random, form, gaps, count, seed, self.contributors, stiffness)
+        return random_inputs(scene, random, form, gaps, count, seed, self.contributors, stiffness)
 
 
 DEFAULT = GapCases()

@@ -26,13 +26,13 @@ from harness.scene.scene_file import edited
 from harness.scene.solution import solve
 from harness.scene.stress import refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
+from harness.series.staged import last_scene
 from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
-from problems.build import load_case
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
-from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
+from problems.load_cases.random_inputs import RandomInputs
 from problems.model.effect import SpringEffect
 from problems.model.fastener_forces import fastener_forces
 from problems.model.positions import FORCES
@@ -45,7 +45,8 @@ from report.document.numbers import counted, position
 from .each import each_joint
 from .gap_regions import patches_of_gap
 from .patches import BORDERS, patches_of, stock_of
-from .search import ShimSearch, ShimStudy
+from .search import ShimSearch
+from .study import ShimStudy
 
 RECORD, ANSWERS = "shim.json", "shims.jsonl"
 MOST = 1e9  # of a limit: larger ones are none
@@ -61,8 +62,9 @@ class Shimming:
 
     Parameters
     ----------
-    shims : dict of str to float
-        The thickness of each shim by the name of its patch, mm; none if each joint has its own.
+    shims : dict of str to float or (float, float)
+        The thickness of each shim by the name of its patch, mm, of a tapered one at either end; none if each
+        joint has its own.
     passed : bool
         Whether the shims are shown to keep the limits.
     sentence : str
@@ -71,7 +73,7 @@ class Shimming:
         The report, in Markdown.
     """
 
-    shims: dict[str, float]
+    shims: dict[str, float | tuple[float, ...]]
     passed: bool
     sentence: str
     report: Path
@@ -89,6 +91,7 @@ def shim(
     allow_stress: float | None = None,
     share: float | None = None,
     each: bool = False,
+    taper: bool = False,
     cases: GapCases = DEFAULT,
     scheduler: str | None = None,
     reporter: Reporter = SILENT,
@@ -115,6 +118,8 @@ def shim(
         Share of the load cases that must keep all limits; by default 0.95, of a single case 1.
     each : bool, optional
         Whether each load case has shims of its own; by default all have the same.
+    taper : bool, optional
+        Whether a shim has a thickness of the stock at each end of its longer range.
     cases : GapCases, optional
         The load cases; by default 100 with random gaps, or the scene alone if its gaps are not random.
     scheduler : str, optional
@@ -140,7 +145,7 @@ def shim(
     >>> found.passed
     True
     """
-    source, directory, bare = str(scene), Path(out), read_scene(str(scene))
+    source, directory, read = str(scene), Path(out), read_scene(str(scene))
     inputs = [Path(file) for file in (scene, patches, *cases.files) if file]
     refuse_inputs([directory / name for name in OUTPUTS], inputs)
     asked: dict[str, Any] = {
@@ -149,25 +154,32 @@ def shim(
         "allow_stress": allow_stress,
         "share": share,
     }
-    faults, thicknesses = cases.faults() + _faults(bare, asked), tuple[float, ...]()
+    faults, thicknesses = cases.faults() + _faults(read, asked), tuple[float, ...]()
     try:
         thicknesses = stock_of(stock)
     except InputError as error:
         faults += error.faults
-    if faults or not isinstance(bare, JointScene):
+    if taper and each:
+        faults.append(Fault("--taper", "with", "--each", "one of both"))
+    if faults or not isinstance(read, JointScene):
         raise InputError(faults)
+    bare = last_scene(read)
+    assert isinstance(bare, JointScene)
     if allow_stress is not None:
         refuse_unusable(allow_stress, bare)
-    single = cases.are_one(bare)
-    form = chosen_form(bare, ("dual", "sparse"), None, 1 if single else cases.count or RANDOM).form
-    made = Listed((load_case(bare, form),)) if single else cases.of(bare, form)
-    for sentence in (*bare.unusual, *made.notes):
+    there = patches_of(bare.joint, None if patches is None else str(patches))
+    number = 1 if cases.are_one(read) else cases.count or RANDOM
+    form = chosen_form(read, ("dual", "sparse"), None, number * len(there)).form
+    made = cases.of_search(read, form)
+    if allow_stress is not None and isinstance(made, RandomInputs):
+        keys = [one.name for one in made.inputs]
+        raise InputError.one("--allow-stress", "random keys", keys, "left out: loads are those of the scene")
+    for sentence in (*read.unusual, *made.notes):
         reporter.say(sentence)
     limits, listed = (allow_force or inf, allow_stress or inf), isinstance(made, MeasuredGaps)
     also = "".join(f", {most:g} {unit}" for most, unit in zip(limits, UNITS, strict=True) if most < inf)
     goal = Goal(allow_gap_mm, Goal.share_of(share, made.count), also=also)
-    there = patches_of(bare.joint, None if patches is None else str(patches))
-    study = ShimStudy(bare, made, form, there, limits)
+    study = ShimStudy(bare, made, form, there, limits, read, 1 + taper)
     if each and not listed and goal.failing(made.count, ALPHA) < 0:
         allowed = f"{made.count} cases cannot show it: take {goal.least(ALPHA / 2)}, or a share of 1"
         raise InputError.one("--share", "share", goal.share, allowed)
@@ -188,10 +200,10 @@ def shim(
         return edited(source, directory, change, (), law)
 
     text([])  # refused now rather than after the search
-    asked |= {"share": goal.share, "stock": list(thicknesses), "each": each}
+    asked |= {"share": goal.share, "stock": list(thicknesses), "each": each, "taper": taper}
     identity = asked | {
         "patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}",
-        "scene_key": bare.key,
+        "scene_key": read.key,
         "cases_key": made.key,
         "cases": made.count,
         "form": form,
@@ -217,13 +229,14 @@ def shim(
         from report.writers.shim_report import write  # slow to import: not before the search
 
         files = fingerprints([*bare.sources, *(file for file in inputs[1:] if file.is_file())])
-        record |= {"scene": bare.name, "title": bare.title, "scene_key": bare.key, "inputs": files}
+        record |= {"scene": bare.name, "title": bare.title, "scene_key": read.key, "inputs": files}
         record |= asked | {"said": words, **stamp()}
         if not each:
             records.replace_text(directory / "shimmed.toml", text([study.effect(item) for item in plan]))
             record |= _as_solved(directory / "shimmed.toml", len(plan), allow_gap_mm)
         records.replace_object(directory / RECORD, record)
-        return Shimming({there[int(k)].name: t for k, t in plan}, passed, words, write(directory))
+        sizes = {there[int(k)].name: t[0] if len(t) == 1 else tuple(t) for k, *t in plan}
+        return Shimming(sizes, passed, words, write(directory))
 
 
 def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
@@ -236,9 +249,6 @@ def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):
         return [*faults, Fault(where, "assembly", "own matrices", "a joint: shims are between its parts")]
-    if scene.stages:
-        names, allowed = [stage.name for stage in scene.stages], "none: shims are found for one stage alone"
-        faults.append(Fault(where, "stage", names, allowed))
     if not any(isinstance(e, SpringEffect) or any(hasattr(e, key) for key in FORCES) for e in scene.effects):
         faults.append(Fault(where, "effect", "no fasteners", "one that presses the parts together"))
     if not scene.joint.pairs:
@@ -295,8 +305,10 @@ def _record(result: Found, study: ShimStudy) -> dict[str, Any]:
     best = result.best or result.steps[0]
     after = result.samples[-1].step if result.samples else best
     figures = _figures(study, [result.steps[0].outcome], [after.outcome])
+    sizes = {int(k): t for k, *t in best.plan}
     for k, patch in enumerate(figures["patches"]):
-        patch["thickness_mm"] = dict(best.plan).get(k, 0.0)
+        patch["thickness_mm"], *end = sizes.get(k, [0.0] * study.ends)
+        patch |= {"thickness_end_mm": end[0]} if end else {}
     samples = [{"cases": len(s.numbers), "kept": s.kept, "interval": s.interval} for s in result.samples]
     steps = [{"moved": step.moved, "gap_mm": step.gap_mm, "plan": step.plan} for step in result.steps]
     return figures | {"samples": samples, "steps": steps}
@@ -308,7 +320,7 @@ def _as_solved(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:
     without = replace(after, effects=after.effects[: len(after.effects) - shims])
     answers = [solve(without), solve(after)]
     check = check_answer(answers[1], allowed_mm, [], mesh := estimated(answers[1]))
-    pairs = zip(*(fastener_forces(answer.scene, answer.x) for answer in answers), strict=True)
+    pairs = zip(*(fastener_forces(answer.problem.scene, answer.x) for answer in answers), strict=True)
     sure = [f"Solver: gaps proven to {check['uncertainty_mm']:.1e} mm", mesh_record(mesh)["said"]]
     sure.append(f"Scan: {check.get('beyond_scan', 'no contact is beyond measured points')}")
     return {"sure": sure, "forces": [old | {"with_shims_N": new["force_N"]} for old, new in pairs]}

@@ -1,7 +1,7 @@
 """The fewest shims from a stock that keep a limit on the gap, then the least of them.
 
-A plan gives some patches a thickness t each: g −= t there. A force in a fastener, or a stress, counts as a
-gap that takes the same share of its limit.
+A plan gives some patches a thickness t each, g −= t there; a tapered shim one at either end of its longer
+side. A force in a fastener, or a stress, counts as a gap that takes the same share of its limit.
 
 Growth starts without shims. Each patch whose gap y is too large gets the least thickness of the stock that is
 at least t + y − limit, the contact problems are solved anew, and so on. A shim lowers the gap of its patch by
@@ -10,66 +10,34 @@ thinner anywhere than what growth ends in. But parts are levers: a shim may reli
 is also made shim by shim, each time by the change for which (max(G, limit), mean of (Σ y⁸ / m)^⅛) is least, G
 the gap that all cases but those that may fail keep. From the better of both each shim in turn is taken out or
 made a step thinner, and the others grow; the best that is better is proven, until there is none. Plans are
-compared by their number of shims, then by Σ t · area.
+compared by their number of shims, then by Σ t · area, and tried in this order: the first that is proven is
+the best.
+
+All of this is estimated in the cases that decide about a plan: the worst ones but those that may fail, none
+of which may fail in turn; in the end all of the worst, some of which may. A plan that keeps the limit in them
+is proven in all cases. If it fails there, it grows further in the cases that are its own worst, or these join
+those that decide.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from heapq import heapify, heappop, heappush
+from itertools import product
 from math import inf
+from typing import Self
 
 import numpy as np
 
-from harness.placement.candidates import Place, Plan
-from harness.placement.plan_search import DIGITS, ESTIMATED, PlanSearch, Step
-from harness.placement.session import Outcome, Study
-from harness.scene.stress import largest_of
-from problems.effects.shims import Shims
-from problems.forms.assembly import Assembly, Mask, Vector
-from problems.model.fastener_forces import fastener_forces, force_error_per_mm
-from problems.model.surface import surface_of
+from harness.placement.candidates import Plan
+from harness.placement.plan_search import DIGITS, ESTIMATED, MORE_CASES, PlanSearch, Step
+from harness.placement.session import Outcome
+from problems.forms.assembly import Matrix
 
-from .patches import Patch
+from .study import ShimStudy
 
-
-@dataclass(frozen=True)
-class ShimStudy(Study):
-    """An item is the number of a patch and a thickness, mm. limits : of force, N, and stress, N/mm²."""
-
-    patches: tuple[Patch, ...]
-    limits: tuple[float, float]
-
-    def effect(self, item: Place) -> Shims:
-        return self.patches[int(item[0])].shim.model_copy(update={"thickness": item[1]})
-
-    @cached_property
-    def masks(self) -> list[Mask]:
-        """The contacts of each patch, and those of none."""
-        inside = [patch.shim.gap(self.bare.joint) < 0 for patch in self.patches]
-        return [*inside, ~np.any(inside, axis=0)]
-
-    @cached_property
-    def areas(self) -> Vector:
-        """(m,) of the contacts, mm²."""
-        joint = self.bare.joint
-        return np.concatenate([surface_of(joint.places(pair)).areas for pair in joint.pairs])
-
-    def further(
-        self, assembly: Assembly, gap: Vector, x: Callable[[], Vector], error_mm: float
-    ) -> tuple[float, ...]:
-        """In each patch and beyond them the largest gap, mm, and ∫ gap, mm³; force, N, and stress, N/mm², if
-        they have a limit.
-        """
-        gaps = [float(gap[mask].max(initial=0.0)) for mask in self.masks]
-        volumes = [float(np.maximum(gap[mask], 0.0) @ self.areas[mask]) for mask in self.masks]
-        force = stress = 0.0
-        if self.limits[0] < inf:
-            at = assembly.at_junction(x())
-            force = max(abs(fastener["force_N"]) for fastener in fastener_forces(self.bare, at))
-            force += force_error_per_mm(self.bare) * error_mm
-        if self.limits[1] < inf:
-            stress = largest_of(self.bare, x())
-        return *gaps, *volumes, force, stress
+AT_ONCE = 8  # plans estimated together
+WORST, NEAREST = 3, 4  # patches whose gap is to fall, and those near each whose shims change
+ALL = inf, inf  # more than any cost
 
 
 @dataclass
@@ -95,21 +63,43 @@ class ShimSearch(PlanSearch):
         return super().used(step) if min(self.study.limits) == inf else share
 
     def cost(self, plan: Plan) -> tuple[float, float]:
-        return len(plan), round(sum(t * self.study.patches[int(k)].area for k, t in plan), DIGITS)
+        volumes = (sum(t) / len(t) * self.study.patches[int(k)].area for k, *t in plan)
+        return len(plan), round(sum(volumes), DIGITS)
+
+    def sizes(self, plan: Plan) -> Matrix:
+        """(patches, ends) the thicknesses, mm; 0 without a shim."""
+        t = np.zeros((len(self.study.patches), self.study.ends))
+        for k, *ends in plan:
+            t[int(k)] = ends
+        return t
+
+    def plan(self, t: Matrix) -> Plan:
+        """The plan of thicknesses; a shim has at least the least one at either end."""
+        rows = ((k, *np.maximum(row, self.stock[0]).tolist()) for k, row in enumerate(t) if row.any())
+        return tuple(rows)
+
+    @property
+    def strict(self) -> Self:
+        """The search in which no case may fail."""
+        return replace(self, allowed=0)
+
+    def deciding(self, step: Step) -> tuple[int, ...]:
+        """The worst cases of a plan but those that may fail, by their numbers."""
+        worst = sorted(range(self.cases), key=lambda k: (-round(step.outcome.largest[k], DIGITS), k))
+        return tuple(sorted(worst[self.allowed :][:MORE_CASES]))
 
     def once(self, current: Plan, count: int | None = None) -> tuple[list[Step], Step]:
         """All plans kept, and the best; the first one, without shims, if no plan keeps the limit."""
         steps, kept = [self.whole((), "no shims")], list[Step]()
         if steps[0].gap_mm <= self.limit_mm:
             return steps, steps[0]
-        for start in self._starts(steps[0]):
-            grown = self.grown([(start, -1)], (), range(self.cases), (inf, inf))
-            most = len(grown[0]) if grown else len(self.study.patches)
-            for plan in (*grown, *self.added(start, most, self.deciding(steps[0]))):
-                steps.append(step := self.whole(plan, "growth"))
-                if step.gap_mm > self.limit_mm and (more := self.thicker(step.plan, step.outcome)):
-                    steps.append(step := self.whole(more, "growth"))  # what the estimate could not tell
-                kept += [step] if step.gap_mm <= self.limit_mm else []
+        cases = self.deciding(steps[0])
+        for start in self._starts(cases):
+            grown = next(self.strict.grown([(start, -1)], (), cases), ())
+            most = len(grown) or len(self.study.patches)
+            for plan in filter(None, (grown, self.strict.added(start, most, cases))):
+                steps += (way := self.kept(plan))
+                kept += way[-1:] if way[-1].gap_mm <= self.limit_mm else []
             if kept:
                 break
         best = last = min(kept, key=lambda step: self.cost(step.plan), default=None)
@@ -117,82 +107,144 @@ class ShimSearch(PlanSearch):
             steps.append(last := best)
         return steps, last or steps[0]
 
-    def _starts(self, without: Step) -> Iterator[Plan]:
+    def _starts(self, cases: Sequence[int]) -> Iterator[Plan]:
         """No shims; where nothing gets there from them, the best with one thickness everywhere."""
         yield ()
-        plans = [tuple((k, t) for k in range(len(self.study.patches))) for t in self.stock]
-        outcomes = self.outcomes(plans, self.deciding(without), ESTIMATED, ())
-        yield min(zip([self._value(one)[0] for one in outcomes], plans, strict=True))[1]
+        plans = [self.plan(np.full_like(self.sizes(()), t)) for t in self.stock]
+        outcomes = self.outcomes(plans, cases, ESTIMATED, ())
+        yield min(zip([self.strict._value(one)[0] for one in outcomes], plans, strict=True))[1]
 
-    def added(self, plan: Plan, most: int, cases: Sequence[int]) -> list[Plan]:
+    def kept(self, plan: Plan) -> list[Step]:
+        """The plan, proven, and what it grows to, until that keeps the limit or cannot grow."""
+        steps = [self.whole(plan, "growth")]
+        while (step := steps[-1]).gap_mm > self.limit_mm:
+            more = self.thicker(step.plan, step.outcome)
+            grown = self.strict.grown([(more, -1)], step.plan, self.deciding(step)) if more else iter(())
+            if not (plan := next(grown, ())):
+                break
+            steps.append(self.whole(plan, "growth"))
+        return steps
+
+    def added(self, plan: Plan, most: int, cases: Sequence[int]) -> Plan:
         """The plan of at most so many shims after the best change of one shim after another, until it keeps
         the limit by estimates, or none helps; none if growth got there with fewer.
         """
         (outcome,) = self.outcomes([plan], cases, ESTIMATED, plan)
+        idle = 0  # changes in succession that did not lower G
         while self.gap(outcome) > self.limit_mm:
             options = [option for option in self._changes(plan, outcome) if len(option) <= most]
             made = self.outcomes(options, cases, ESTIMATED, plan) if options else []
             values = [(self._value(one), option) for one, option in zip(made, options, strict=True)]
-            if not values or min(values)[0] >= self._value(outcome):
-                return [plan] if most == len(self.study.patches) else []
-            outcome, plan = made[k := values.index(min(values))], options[k]
-        return [plan]
+            if idle > len(self.study.patches) or not values or min(values)[0] >= self._value(outcome):
+                return plan if most == len(self.study.patches) else ()
+            k = values.index(min(values))
+            idle = idle + 1 if self.gap(made[k]) >= self.gap(outcome) else 0
+            outcome, plan = made[k], options[k]
+        return plan
 
     def _value(self, outcome: Outcome) -> tuple[float, float]:
         mean = float(np.mean(outcome.mean))
         return round(max(self.gap(outcome), self.limit_mm), DIGITS), round(mean, DIGITS)
 
     def _changes(self, plan: Plan, outcome: Outcome) -> list[Plan]:
-        """One patch as thick as its gap asks for or a step more, a step thinner, or without a shim."""
-        changed, now = list[Plan](), dict(plan)
-        for k, excess in enumerate(self._excess(outcome)):
-            options = {*self._enough(now.get(k, 0.0), max(excess, 0.0))[:2], *self._thinner(now.get(k, 0.0))}
-            changed += [_with(plan, k, option) for option in sorted(options)]
-        return changed
+        """A thickness as large as a gap asks for or a step more, one less, or no shim, in a patch near
+        one of those whose gap is the largest.
+        """
+        changed, t, excess = dict[Plan, None](), self.sizes(plan), self._excess(outcome)
+        worst = np.argsort(-excess.max(axis=1), kind="stable")[:WORST]
+        some = np.unique(self.study.near[worst, :NEAREST])
+        for k, end in product(some.tolist(), range(self.study.ends)):
+            now = float(t[k, end])
+            options = [*self._enough(now, max(excess[k, end], 0.0))[:2], *self._thinner(now)]
+            changed |= dict.fromkeys(self._with(t, k, end, option) for option in sorted(options))
+        return list(changed)
+
+    def _with(self, t: Matrix, k: int, end: int, option: float) -> Plan:
+        """The plan with that thickness at an end of patch k; 0: without its shim."""
+        t = t.copy()
+        t[k, end if option else slice(None)] = option
+        return self.plan(t)
 
     def better(self, step: Step) -> Step | None:
-        """The best plan that is better, by a shim less or thinner and what others grow to, if any."""
-        moves = [(_with(step.plan, int(k), t), int(k)) for k, now in step.plan for t in self._thinner(now)]
-        plans = self.grown(moves, step.plan, self.deciding(step), self.cost(step.plan))
-        for plan in sorted(set(plans), key=lambda plan: (self.cost(plan), plan)):
+        """A better plan that is proven, if any: one in which the same cases fail, or else other ones."""
+        strict = self._descended(step, self.strict, self.deciding(step))
+        return strict or (self._descended(step, self, super().deciding(step)) if self.allowed else None)
+
+    def _descended(self, step: Step, search: Self, cases: tuple[int, ...]) -> Step | None:
+        """A better plan that is proven, if any, by one shim after another that is taken out or thinner, and
+        by what others grow to: each time the cheapest by estimates.
+        """
+        refused, base = set[Plan](), step.plan
+        while True:
+            plan = cheaper = base
+            while cheaper:
+                plan = cheaper
+                grown = search.grown(self._fewer(plan), base, cases, self.cost(plan))
+                cheaper = next((one for one in grown if one not in refused), ())
+            if plan == base:
+                return None
             if (other := self.whole(plan, "descent")).gap_mm <= self.limit_mm:
                 return other
-        return None
+            refused.add(plan)
+            failing = {k for k in self.deciding(other) if other.outcome.largest[k] > self.limit_mm}
+            cases = tuple(sorted({*cases, *failing}))
+
+    def _fewer(self, plan: Plan) -> list[tuple[Plan, int]]:
+        """Plans with a shim less or a step thinner, and the number of its patch."""
+        t = self.sizes(plan)
+        return [
+            (self._with(t, k, end, option), k)
+            for (k, end), now in np.ndenumerate(t)
+            for option in self._thinner(now)
+        ]
 
     def grown(
-        self, starts: list[tuple[Plan, int]], base: Plan, cases: Sequence[int], below: tuple[float, float]
-    ) -> list[Plan]:
+        self,
+        starts: list[tuple[Plan, int]],
+        base: Plan,
+        cases: Sequence[int],
+        below: tuple[float, float] = ALL,
+    ) -> Iterator[Plan]:
         """What plans grow to, each with the number of a patch that does not, if that keeps the limit by
-        estimates and costs less. base : see Question.
+        estimates and costs less; the cheapest first. base : see Question.
         """
-        kept, waiting = list[Plan](), starts
-        while waiting := [(plan, held) for plan, held in waiting if self.cost(plan) < below]:
-            outcomes = self.outcomes([plan for plan, _ in waiting], cases, ESTIMATED, base)
-            pairs = list(zip(waiting, outcomes, strict=True))
-            kept += [plan for (plan, _), outcome in pairs if self.gap(outcome) <= self.limit_mm]
-            thicker = [
-                (self.thicker(plan, outcome, held), held)
-                for (plan, held), outcome in pairs
-                if self.gap(outcome) > self.limit_mm
-            ]
-            waiting = [(plan, held) for plan, held in dict.fromkeys(thicker) if plan]
-        return kept
+        waiting = [(self.cost(plan), plan, held) for plan, held in starts]
+        kept, seen = list[tuple[tuple[float, float], Plan]](), set(waiting)
+        heapify(waiting)
+        while waiting or kept:
+            if kept and (not waiting or kept[0] < waiting[0][:2]):
+                yield heappop(kept)[1]
+                continue
+            some = [heappop(waiting) for _ in waiting[:AT_ONCE]]
+            outcomes = self.outcomes([plan for _, plan, _ in some], cases, ESTIMATED, base)
+            for (cost, plan, held), outcome in zip(some, outcomes, strict=True):
+                if self.gap(outcome) <= self.limit_mm:
+                    if (cost, plan) not in kept:
+                        heappush(kept, (cost, plan))
+                elif more := self.thicker(plan, outcome, held):
+                    entry = self.cost(more), more, held
+                    if entry[0] < below and entry not in seen:
+                        seen.add(entry)
+                        heappush(waiting, entry)
 
     def thicker(self, plan: Plan, outcome: Outcome, held: int = -1) -> Plan:
         """The plan with what the gap of each patch asks for, or the thickest; empty if a patch has that
         already or is held, or if no gap asks.
         """
-        now, asking = dict(plan), [(k, more) for k, more in enumerate(self._excess(outcome)) if more > 0]
-        if any(k == held or now.get(k) == self.stock[-1] for k, _ in asking) or not asking:
+        t, excess = self.sizes(plan), self._excess(outcome)
+        asking = excess > 0
+        if not asking.any() or (held >= 0 and asking[held].any()) or (t[asking] == self.stock[-1]).any():
             return ()
-        now |= {k: [*self._enough(now.get(k, 0.0), more), self.stock[-1]][0] for k, more in asking}
-        return tuple(sorted(now.items()))
+        for at in zip(*np.nonzero(asking), strict=True):
+            t[at] = [*self._enough(t[at], excess[at]), self.stock[-1]][0]
+        return self.plan(t)
 
-    def _excess(self, outcome: Outcome) -> list[float]:
-        """By how much the gap of each patch is too large, mm, in all cases but the worst, which may fail."""
+    def _excess(self, outcome: Outcome) -> Matrix:
+        """(patches, ends) by how much the gap is too large, mm, in all cases but those that may fail."""
         order = sorted(range(len(outcome.largest)), key=lambda k: (outcome.largest[k], k))
         figures = np.array([outcome.further[k] for k in order[: len(order) - self.allowed]])
-        return list(map(float, figures[:, : len(self.study.patches)].max(axis=0) - self.limit_mm))
+        start, shape = 2 * len(self.study.masks), self.sizes(()).shape
+        return np.asarray(figures[:, start:-2].max(axis=0).reshape(shape) - self.limit_mm)
 
     def _enough(self, t: float, excess: float) -> list[float]:
         """The thicknesses of the stock above t that are not below t + excess."""
@@ -202,9 +254,3 @@ class ShimSearch(PlanSearch):
         """No shim, and a step thinner than t."""
         lower = [0.0, *(s for s in self.stock if s < t)] if t else []
         return list(dict.fromkeys(lower[:1] + lower[-1:]))
-
-
-def _with(plan: Plan, patch: int, thickness: float) -> Plan:
-    """The plan with that thickness of a patch; 0: none."""
-    rest = {k: t for k, t in plan if k != patch} | ({patch: thickness} if thickness else {})
-    return tuple(sorted(rest.items()))

@@ -1,13 +1,13 @@
-"""Shims: a sheet of given thickness fills the gap over a rectangle or a polygon."""
+"""Shims: a sheet, even or tapered, fills the gap over a rectangle or a polygon."""
 
 from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded_types import Finite, Positive, Range
+from problems.input.bounded_types import NUMBER, NUMBERS, Finite, Positive, Range, is_list
 from problems.model.effect import ContactEffect, Effect, GapEffect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults, Pair
@@ -22,11 +22,16 @@ class Shims(ContactEffect, GapEffect):
     """g −= thickness at every contact with x and y in the ranges, borders included, or in the outline; mm.
 
     A contact on the border of an outline belongs to what is left of and below it, as far as there is a
-    junction: of outlines that touch one has it. A shim is rigid. One thicker than the gap holds the parts
-    apart; overlapping shims add up.
+    junction: of outlines that touch one has it. Two thicknesses are those at the ends of the longer range,
+    and it is linear between. A shim is rigid. One thicker than the gap holds the parts apart; overlapping
+    shims add up.
     """
 
-    thickness: Annotated[Positive, "mm"]
+    thickness: Annotated[
+        Annotated[Positive, Tag(NUMBER)] | Annotated[tuple[Positive, Positive], Tag(NUMBERS)],
+        Discriminator(is_list),
+        "mm",
+    ]
     x: Annotated[Range | None, "mm"] = None
     y: Annotated[Range | None, "mm"] = None
     outline: Annotated[Outline, "mm"] = ()
@@ -65,8 +70,18 @@ class Shims(ContactEffect, GapEffect):
         right = (cross(edge, at[:, None] - corners) > 0) == (edge[:, 1] > 0)
         return np.asarray(((above != np.roll(above, -1, axis=1)) & right).sum(axis=1) % 2 == 1)
 
+    def along(self, places: Matrix) -> Vector:
+        """Where places (k, 2), mm, are on the longer range: 0 at its start, 1 at its stop."""
+        axis = int(np.ptp(self.ranges, axis=1).argmax())
+        start, stop = self.ranges[axis]
+        return np.asarray((places[:, axis] - start) / (stop - start))
+
     def gap(self, joint: AnyJoint) -> Vector:
+        first, last = np.resize(self.thickness, 2)
+
         def filled(pair: Pair) -> Vector:
-            return np.where(self._covered(joint.places(pair), joint), -self.thickness, 0.0)
+            places = joint.places(pair)
+            thickness = first + (last - first) * self.along(places)
+            return np.where(self._covered(places, joint), -thickness, 0.0)
 
         return at_contacts(filled, self.pairs(joint), joint)

@@ -22,7 +22,13 @@ from .random_gaps import RandomGaps, random_gaps
 
 
 def drawn_cases(scene: Scene, form: Form, fasteners: bool = False, **law: Any) -> LoadCases:
-    """The load cases of a suite: random gaps by its law, or a stream of them and of fasteners."""
+    """The load cases of a suite: random gaps by its law, or a stream of them and of fasteners.
+
+    Raises InputError if more of the scene is random.
+    """
+    if isinstance(scene, JointScene) and scene.random:
+        allowed = "left out: a suite draws gaps alone"
+        raise InputError.one(f"scene {scene.name}", "random", list(scene.random), allowed)
     gaps = random_gaps(scene, **law, form=form)
     return Stream.of(scene, gaps, form) if fasteners and isinstance(scene, JointScene) else gaps
 

@@ -109,7 +109,7 @@ class Scene(ABC):
 class JointScene(Scene):
     """A joint and the effects that the scene includes.
 
-    random : the table [random], each entry as KEY=DISTRIBUTION, in no key; `series` draws them.
+    random : the table [random], each entry as KEY=DISTRIBUTION, in no key; `GapCases` draws them.
     model : see `problems.build.model_of`; neither copied nor sent to a worker.
     """
 

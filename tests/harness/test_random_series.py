@@ -1,5 +1,7 @@
 """A series with random keys: its rows, the scene's own table, resumption, and cases in any order."""
 
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +9,19 @@ import pytest
 from commands import harness
 from strip_scene import STRIP
 
+from harness import shim
+from harness.placement.candidates import MovableFasteners
+from harness.placement.session import FastenerStudy, PlanSession, Question
 from harness.results import series_file
 from harness.scene.solution import solve
 from harness.series.derivatives import derivatives
 from harness.series.load_case_source import GapCases
 from harness.series.session import Job, SeriesSession
+from harness.shimming.patches import patches_of
+from harness.shimming.study import ShimStudy
+from problems.errors import InputError
+from problems.load_cases.stream import drawn_cases
+from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from rivetbench import run_series
 
@@ -124,3 +134,43 @@ def test_a_key_of_K_has_a_K_for_each_of_its_values(tmp_path: Path) -> None:
         assert row["max_gap_mm"] == pytest.approx(solve(read_scene(str(path))).gap.max(), abs=1e-9)
     slopes = derivatives(Job(scene=read, cases=drawn, form="dual"))["derivative"]
     assert np.isnan(slopes).tolist() == [True, True, False]
+
+
+def test_searches_draw_what_a_series_draws(scene: Path, tmp_path: Path) -> None:
+    """The proven gaps of the scene's own fasteners, and the largest of the preloads that are drawn."""
+    assert harness("series", scene, "--cases", 3, "--out", tmp_path / "series").exit_code == 0
+    rows, read = rows_of(tmp_path / "series"), read_scene(str(scene))
+    assert isinstance(read, JointScene)
+    cases = GapCases(count=3).of_search(read, "dual")
+    session = PlanSession(ShimStudy(read, cases, "dual", patches_of(read.joint, "1x1"), (1e9, inf), read))
+    (outcome,) = session.answer(Question(((),), (0, 1, 2)))
+    assert outcome.largest == pytest.approx([row["max_gap_mm"] for row in rows], abs=1e-7)
+    forces = [max(np.ravel(row["fasteners.preload"])) for row in rows]
+    assert [figures[-2] for figures in outcome.further] == pytest.approx(forces)
+    pressed = replace(read, random=("pressure.value=uniform(0, 2e-4)",))
+    movable = MovableFasteners.of(pressed)
+    cases = GapCases(count=3).of_search(movable.bare, "dual")
+    (placed,) = PlanSession(FastenerStudy(movable.bare, cases, "dual", movable)).answer(
+        Question((movable.current,), (0, 1, 2))
+    )
+    for k, largest in enumerate(placed.largest):
+        drawn = cases.parameters(k)
+        text = scene.read_text().replace("1e-4\n", f"{drawn['pressure.value']!r}\n")
+        (tmp_path / "drawn.toml").write_text(text.replace("seed = 7", f"seed = {drawn['gap_seed']}"))
+        assert largest == pytest.approx(solve(tmp_path / "drawn.toml").gap.max(), abs=1e-7)
+
+
+def test_what_searches_cannot_draw_is_refused(scene: Path, tmp_path: Path) -> None:
+    shims = "shim", scene, "--allow-gap", 0.1, "--stock", 0.1
+    for words, said in (
+        (("place", scene, "--count", 1), "the fasteners change places"),
+        ((*shims, "--allow-stress", 100), "loads are those of the scene"),
+    ):
+        done = harness(*words, "--out", tmp_path / "out")
+        assert done.exit_code == 2
+        assert said in " ".join(done.output.split())
+    drawn = GapCases(random=("pressure.value=norm()",), contributors=2)
+    with pytest.raises(InputError, match="not independent"):
+        shim(scene, tmp_path / "out", allow_gap_mm=0.1, stock="0.1", cases=drawn)
+    with pytest.raises(InputError, match="draws gaps alone"):
+        drawn_cases(read_scene(str(scene)), "dual", cases=2, seed=0)

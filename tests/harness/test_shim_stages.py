@@ -1,0 +1,98 @@
+"""Shims in a scene with stages, and tapered ones: plans against `solve` on the scene with their effects."""
+
+import json
+from dataclasses import replace
+from itertools import product
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import harness
+from small_joints import FASTENERS, GAP, STAGED, two_parts
+
+from harness import solve, stresses
+from harness.placement.session import PlanSession, Question
+from harness.series.staged import last_scene
+from harness.shimming.patches import patches_of
+from harness.shimming.search import ShimSearch
+from harness.shimming.study import ShimStudy
+from problems.build import load_case
+from problems.effects.shims import Shims
+from problems.load_cases import Listed
+from problems.model.fastener_forces import fastener_forces
+from problems.model.scene import JointScene
+from problems.scene_files import read_scene
+
+
+def session_of(
+    path: Path, patches: str, limits: tuple[float, float] = (inf, inf), ends: int = 1
+) -> PlanSession:
+    """Of the scene's own gap."""
+    read = read_scene(str(path))
+    assert isinstance(read, JointScene)
+    bare = last_scene(read)
+    assert isinstance(bare, JointScene)
+    cases = Listed((load_case(bare),))
+    return PlanSession(ShimStudy(bare, cases, "dual", patches_of(read.joint, patches), limits, read, ends))
+
+
+def test_a_plan_is_judged_after_the_last_stage(tmp_path: Path) -> None:
+    """Gap, force and stress, no less than those of `solve`; shims act in all stages."""
+    (tmp_path / "scene.toml").write_text(STAGED, "utf-8")
+    session = session_of(tmp_path / "scene.toml", "2x2", (1e9, 1e9))
+    study = session.study
+    plan = ((0.0, 0.02), (3.0, 0.01))
+    (outcome,) = session.answer(Question((plan,), (0,)))
+    (estimated,) = session.answer(Question((plan,), (0,), base=()))
+    answer = solve(replace(study.scene, effects=(*study.scene.effects, *map(study.effect, plan))))
+    assert answer.gap.max() <= outcome.largest[0] <= answer.gap.max() + 2e-7
+    *_, force, stress = outcome.further[0]
+    largest = max(abs(one["force_N"]) for one in fastener_forces(answer.problem.scene, answer.x))
+    assert largest <= force <= largest * (1 + 1e-6)
+    most = stresses(answer).largest
+    assert most["von_mises"] <= stress <= most["von_mises"] + 10 * most["error"] + 1e-4
+    assert estimated.further[0] == pytest.approx(outcome.further[0], rel=1e-3, abs=1e-6)
+
+
+def test_a_tapered_shim_is_linear_along_its_longer_side(tmp_path: Path) -> None:
+    """Two in a row are one ramp, also at the contacts beside their border."""
+    path = tmp_path / "scene.toml"
+    path.write_text(two_parts(length=200.0, nodes=(21, 5)) + GAP + FASTENERS)
+    joint = read_scene(str(path)).joint  # type: ignore[attr-defined]
+    ramp = Shims(kind="shims", thickness=(0.1, 0.3), x=(0.0, 200.0), y=(0.0, 50.0)).gap(joint)
+    np.testing.assert_allclose(ramp, -0.1 - 1e-3 * joint.nodes[:, 0], rtol=1e-14)
+    upright = Shims(kind="shims", thickness=(0.1, 0.3), x=(0.0, 40.0), y=(0.0, 50.0)).gap(joint)
+    covered = joint.nodes[:, 0] <= 40.0
+    np.testing.assert_allclose(upright, np.where(covered, -0.1 - 4e-3 * joint.nodes[:, 1], 0.0), rtol=1e-14)
+    study = session_of(path, "2x1", ends=2).study
+    two = sum(study.effect(item).gap(joint) for item in ((0, 0.1, 0.2), (1, 0.2, 0.3)))  # type: ignore[arg-type]
+    np.testing.assert_allclose(two, ramp, rtol=1e-14)
+
+
+def test_the_least_of_all_tapered_plans_is_found(tmp_path: Path) -> None:
+    path, stock = tmp_path / "scene.toml", (0.02, 0.05)
+    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS)
+    session = session_of(path, "3x1", ends=2)
+    study = session.study
+    assert isinstance(study, ShimStudy)
+    kinds = [(), *product(stock, repeat=2)]
+    plans = [tuple((float(k), *t) for k, t in enumerate(p) if t) for p in product(kinds, repeat=3)]
+    gaps = {plan: session.answers([plan], (0,), 1e-9)[-1].vectors[1].max() for plan in plans}
+    limit = 0.6 * gaps[()]
+    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, limit, study, stock)
+    _, best = search.once(())
+    assert best.gap_mm <= limit
+    assert search.cost(best.plan) == min(search.cost(plan) for plan, gap in gaps.items() if gap <= limit)
+
+
+def test_the_command_writes_both_ends_of_a_tapered_shim(tmp_path: Path) -> None:
+    path, out = tmp_path / "scene.toml", tmp_path / "out"
+    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP.replace("random", "# random") + FASTENERS)
+    asked = ("--allow-gap", 0.04, "--stock", "0.01,0.02,0.04", "--patches", "3x1", "--taper")
+    done = harness("shim", path, *asked, "--out", out)
+    assert done.exit_code in (0, 4), done.output
+    record = json.loads((out / "shim.json").read_text())
+    assert f"{record['after']['gap']:.9f}" == f"{solve(str(out / 'shimmed.toml')).gap.max():.9f}"
+    for patch in record["patches"]:
+        assert {patch["thickness_mm"], patch["thickness_end_mm"]} <= {0.0, 0.01, 0.02, 0.04}
