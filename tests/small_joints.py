@@ -19,6 +19,11 @@ def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> J
     return Joint.model_validate({"junction": data, "part": part, "contacts": contacts})
 
 
+#: Half of a joint, and a small joint of two of these.
+PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
+JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
+
+
 def two_parts(
     length: float = 100.0, width: float = 50.0, nodes: tuple[int, int] = (4, 3), side: str = "north"
 ) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from small_joints import make_joint
+from small_joints import PART, make_joint
 
 from harness.scene.solution import Solution, solve
 from problems import formats
@@ -17,8 +17,6 @@ from problems.scene_files import scene_of
 
 Array = NDArray[np.float64]
 Tables = dict[str, Any]
-
-PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 
 
 def two_plates(nodes: tuple[int, int] = (9, 5)) -> Joint:

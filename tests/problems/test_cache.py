@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_joints import forbid_building, make_joint, make_scene
+from small_joints import PART, forbid_building, make_joint, make_scene
 
 from problems import build, storage
 from problems.effects.supports import Supports
@@ -17,7 +17,6 @@ from problems.scene_files import read_scene
 from problems.storage import ROOT
 
 ARRAYS = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
-PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 SCENE = make_scene(
     make_joint(PART, PART | {"name": "b"}),
     Supports(kind="supports", part="a", points=((200.0, 60.0),), stiffness_per_point=1e3),

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from small_joints import make_joint, make_scene
+from small_joints import JOINT, PART, make_joint, make_scene
 
 from problems.effects.clamps import Clamps
 from problems.effects.fasteners import Fasteners
@@ -16,8 +16,6 @@ from problems.effects.pressure import Pressure
 from problems.effects.rigid_tool import RigidTool
 from problems.effects.shims import Shims
 
-PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
-JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
 POINT = st.tuples(st.floats(0, 400), st.floats(0, 120))
 THREE = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, nodes=(9, 5))
 ON_TOOL = make_joint(PART, contacts=[["a", "tool"]], nodes=(9, 5))

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_joints import make_joint
-from superelements import PART, solved
+from small_joints import PART, make_joint
+from superelements import solved
 from test_drawn import drawn_scene
 
 import problems.random_scenes

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_joints import make_joint, make_scene
+from small_joints import JOINT, make_scene
 from superelements import flat, scene_from, stiffnesses, write_part
 
 from problems.effects.measured_gap import MeasuredGap
@@ -12,8 +12,6 @@ from problems.errors import InputError
 from problems.load_cases.gaps_through_scan import NOISE
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
 
-PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
-JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
 SD, LENGTH, COUNT = 0.2, 120.0, 4000
 SCAN = np.array([[0.0, 0.0, 0.5], [130.0, 41.0, 0.9], [133.0, 44.0, 0.95], [400.0, 120.0, 0.3]])
 

@@ -5,14 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.linalg import subspace_angles
-from small_joints import make_joint, make_scene
+from small_joints import JOINT, make_scene
 
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
 from problems.load_cases.scan_modes import scan_modes
 
-PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
-JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
 SCENE = make_scene(JOINT)
 NODES = JOINT.nodes  # scans have a point at each, so that interpolation is exact
 X, Y = (NODES / NODES.max(axis=0)).T

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_joints import make_joint, make_scene
+from small_joints import PART, make_joint, make_scene
 
 from problems.effects.fasteners import Fasteners
 from problems.effects.measured_gap import MeasuredGap
@@ -87,7 +87,6 @@ def test_refused_by_line(text: str, line: str, words: str, tmp_path: Path) -> No
     assert [(fault.key, words in fault.allowed) for fault in read.faults] == [(line, True)], read
 
 
-PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(3, 3))
 ROW = ",".join(["0.25"] * 9)
 GAPS = {

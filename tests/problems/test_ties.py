@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 from scipy.interpolate import RegularGridInterpolator
-from small_joints import make_joint, make_scene, untied
+from small_joints import PART, make_joint, make_scene, untied
 
 from problems.build import prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.pressure import Pressure
 from problems.effects.supports import Supports
 
-PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 TWO = make_joint(PART, PART | {"name": "b"})
 FOUR = make_joint(*(PART | {"name": name, "thickness": 4.0 + k} for k, name in enumerate("abcd")))
 
