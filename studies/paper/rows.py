@@ -14,7 +14,7 @@ import pandas as pd
 from report.analysis.standings import TIE, seconds_text
 from report.document.blocks import Column, Table
 from report.document.numbers import as_number, significant
-from report.results.reader import read
+from report.results.reader import Results, read
 
 Row = dict[str, Any]
 ByScene = dict[str, Row]
@@ -95,9 +95,12 @@ def timed(cells: pd.DataFrame) -> pd.DataFrame:
 
 def study(directory: Path) -> Study:
     """Raises FileNotFoundError if DIRECTORY has no rows, ValueError if several machines made them."""
-    results = read(directory)
+    return study_of(read(directory))
+
+
+def study_of(results: Results) -> Study:
     if results.rows["machine"].nunique() > 1:
-        raise ValueError(f"{directory}: times of several machines cannot be compared")
+        raise ValueError(f"{results.directory}: times of several machines cannot be compared")
     cells = timed(results.cells[results.cells["status"] != "unsupported"])
     cells = cells.sort_values(["tolerance", "threads"], ascending=[True, False], kind="stable")
     rows: dict[tuple[str, ...], Row] = {}

@@ -5,9 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from synthetic_results import COND, no_answer, row, write_rows
 
-from studies.paper.rows import Study, study
+from report.results.reader import Results
+from report.results.rows import cells_of, frame
+from studies.paper.rows import Study, study_of
 
 LOADS = {
     4386: (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592),
@@ -107,9 +110,13 @@ def paper_rows() -> Rows:
 def write_paper(directory: Path, rows: Rows) -> Path:
     """A results directory of these rows."""
     write_rows(directory, rows)
-    lines = [json.dumps(_problem(r)) + "\n" for r in {r["scene"]: r for r in rows}.values()]
+    lines = [json.dumps(problem) + "\n" for problem in _problems(rows)]
     (directory / "problems.jsonl").write_text("".join(lines), "utf-8")
     return directory
+
+
+def _problems(rows: Rows) -> Rows:
+    return [_problem(r) for r in {r["scene"]: r for r in rows}.values()]
 
 
 def changed(rows: Rows, chosen: Callable[[Row], bool], **figures: Any) -> Rows:
@@ -117,8 +124,10 @@ def changed(rows: Rows, chosen: Callable[[Row], bool], **figures: Any) -> Rows:
     return [r | {k: v(r) if callable(v) else v for k, v in figures.items()} if chosen(r) else r for r in rows]
 
 
-def studied(directory: Path, rows: Rows) -> Study:
-    return study(write_paper(directory, rows))
+def studied(rows: Rows) -> Study:
+    """As if they had been read from a directory."""
+    made = frame(rows)
+    return study_of(Results(Path(), made, cells_of(made), pd.DataFrame(_problems(rows))))
 
 
 def ipm(option: str = "", value: object = None) -> Callable[[Row], bool]:

@@ -33,9 +33,9 @@ from studies.paper.claims import EVIDENCE
 from studies.paper.figures5_7 import crossings
 
 
-def words(directory: Path, rows: Rows, *names: str) -> dict[str, str]:
+def words(rows: Rows, *names: str) -> dict[str, str]:
     """Of each claim yes, no, part, open or not measured."""
-    study = studied(directory, rows)
+    study = studied(rows)
     found = {name: claims.holds(met for _, met, _ in EVIDENCE[name](study)) for name in names}
     return {name: "part" if " of " in said else said.split(",")[0] for name, said in found.items()}
 
@@ -109,12 +109,12 @@ def curve(name: str, seconds: Callable[[float], float], shares: list[float]) -> 
     return [make(*a, solve_s=seconds(a[2] / 2193)) for a in at]
 
 
-def test_a_crossing_stands_where_it_was_put(tmp_path: Path) -> None:
+def test_a_crossing_stands_where_it_was_put() -> None:
     # log t: 2s against 1.5 − 3s, equal at s = 0.3
     shares = [0.05, 0.2, 0.45, 0.9]
     rows = curve("IPM", lambda s: math.exp(2 * s), shares)
     rows += curve("GI dual", lambda s: math.exp(1.5 - 3 * s), shares)
-    found = crossings(studied(tmp_path, rows), 4386, "GI dual", "IPM")
+    found = crossings(studied(rows), 4386, "GI dual", "IPM")
     assert found == "at 5 % IPM is faster; at 30 % GI dual becomes faster"
 
 
@@ -125,16 +125,16 @@ def test_a_crossing_stands_where_it_was_put(tmp_path: Path) -> None:
         (1.5, "none: GI dual is faster from 40 to 80 % (1 not comparable)"),  # too early
     ],
 )
-def test_a_crossing_beside_a_stopped_run_is_an_interval(tmp_path: Path, limit: float, text: str) -> None:
+def test_a_crossing_beside_a_stopped_run_is_an_interval(limit: float, text: str) -> None:
     rows = curve("IPM", lambda s: 2.0, [0.1, 0.4, 0.8]) + curve("GI dual", lambda s: 1.0, [0.1, 0.4, 0.8])
     rows = changed(rows, lambda r: gi("dual")(r) and r["active"] < 300, **late(limit))
-    assert crossings(studied(tmp_path, rows), 4386, "GI dual", "IPM") == text
+    assert crossings(studied(rows), 4386, "GI dual", "IPM") == text
 
 
-def test_times_of_two_machines_are_refused(tmp_path: Path) -> None:
+def test_times_of_two_machines_are_refused() -> None:
     rows = [plain("4386/0052", 4386, 52, machine=name) for name in ("one", "other")]
     with pytest.raises(ValueError, match="several machines"):
-        studied(tmp_path, rows)
+        studied(rows)
 
 
 # Claims.
@@ -217,8 +217,8 @@ CHANGES: list[tuple[str, Callable[[Row], bool], Row, str]] = [
 ]
 
 
-def test_the_claims_hold_where_the_rows_are_as_the_paper_says(tmp_path: Path) -> None:
-    found = words(tmp_path, paper_rows(), *EVIDENCE)
+def test_the_claims_hold_where_the_rows_are_as_the_paper_says() -> None:
+    found = words(paper_rows(), *EVIDENCE)
     others = {name: said for name, said in found.items() if said != "yes"}
     # the starts differ by two iterations and by no time; and Goldfarb–Idnani is the slower throughout
     assert others == {"start saves time": "open", "GI chosen well": "no"}
@@ -226,9 +226,9 @@ def test_the_claims_hold_where_the_rows_are_as_the_paper_says(tmp_path: Path) ->
 
 @pytest.mark.parametrize(("claim", "chosen", "figures", "follows"), CHANGES)
 def test_a_claim_turns_with_the_rows(
-    tmp_path: Path, claim: str, chosen: Callable[[Row], bool], figures: dict[str, Any], follows: str
+    claim: str, chosen: Callable[[Row], bool], figures: dict[str, Any], follows: str
 ) -> None:
-    assert words(tmp_path, changed(paper_rows(), chosen, **figures), claim) == {claim: follows}
+    assert words(changed(paper_rows(), chosen, **figures), claim) == {claim: follows}
 
 
 def test_every_claim_has_evidence_and_can_turn_out_otherwise() -> None:
@@ -238,9 +238,9 @@ def test_every_claim_has_evidence_and_can_turn_out_otherwise() -> None:
     assert {claim for claim, *_ in CHANGES} == set(names)
 
 
-def test_without_its_rows_a_claim_is_not_measured(tmp_path: Path) -> None:
+def test_without_its_rows_a_claim_is_not_measured() -> None:
     rows = [plain("4386/0052", 4386, 52, solver="piqp")]
-    assert set(words(tmp_path, rows, *EVIDENCE).values()) == {"not measured"}
+    assert set(words(rows, *EVIDENCE).values()) == {"not measured"}
 
 
 def test_rows_are_found_by_what_was_run_not_by_its_name(tmp_path: Path) -> None:
