@@ -22,7 +22,7 @@ from problems.model.surface import Grid
 def scenes() -> list[JointScene]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(problems.random_scenes, "__version__", "0.2.0")
-        return [drawn_scene(f"drawn/superelements/{k}") for k in range(48)]
+        return [drawn_scene(f"drawn/superelements/{k}") for k in range(30)]
 
 
 def test_a_name_gives_the_same_joint_everywhere(scenes: list[JointScene]) -> None:
