@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse as sp
 from commands import harness
 from scipy.sparse.linalg import spsolve
+from small_joints import degrees
 
 from harness.scene.solution import solve
 from harness.scene.stress import stresses, stresses_of
@@ -102,6 +103,15 @@ def test_a_cantilever_is_exact() -> None:
     np.testing.assert_allclose(stress.components[:, 0], exact, rtol=1e-9)
     np.testing.assert_allclose(stress.components[:, 1:], 0.0, atol=1e-9 * abs(exact).max())
     np.testing.assert_allclose(stress.von_mises, abs(exact), rtol=1e-9)
+
+
+def test_a_pure_twist_is_a_pure_shear() -> None:
+    """w = cxy, a field of the element: τ_xy = −E t c / 2(1 + ν)."""
+    plate, c = square(3), 1e-4
+    u = degrees(plate.x, plate.y, lambda x, y: (c * x * y, c * y, c * x, c))
+    stress = part_stress("plate", PartModel(plate, (), range(4)), (), u, NOWHERE)
+    shear = -E * T * c / (2 * (1 + NU))
+    np.testing.assert_allclose(stress.components, np.tile([0.0, 0.0, shear], (36, 1)), atol=1e-9 * abs(shear))
 
 
 @pytest.mark.parametrize("padded", [False, True])
