@@ -184,4 +184,4 @@ def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPat
     assert table[table["fresh"]]["kept"].tolist() == [62, 55]
     ends = [share_interval(kept, count) for kept in table["kept"]]
     np.testing.assert_allclose(table[["low", "high"]], ends, rtol=1e-12)
-    assert (tmp_path / "out/shares.png").stat().st_size > 1000
+    assert "](shares.png)" in (tmp_path / "out/report.md").read_text()
