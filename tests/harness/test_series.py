@@ -218,7 +218,7 @@ def test_ratios_are_to_the_fastest_librarys_next_case_warm_or_cold() -> None:
     }
     lines = [
         {
-            **{"machine": "a", "scene": "s", "solver": solver, "form": "dual", "variant": ""},
+            **{"machine": "a", "round": "", "scene": "s", "solver": solver, "form": "dual", "variant": ""},
             **{"tolerance": 1e-9, "threads": threads, "case": k, "warm": float(k > 0)},
             "owner": "ours" if solver == "newton" else "library",
             "verdict": "outside" if solver == "clarabel" else "within",
