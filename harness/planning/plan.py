@@ -61,7 +61,7 @@ class Measurement:
     @property
     def variant(self) -> str:
         """The entry's label, and the limit on iterations."""
-        limit = "" if self.iteration_limit is None else f" at most {self.iteration_limit} iterations"
+        limit = "" if self.iteration_limit is None else f" stopped at {self.iteration_limit}"
         return f"{self.entry.label}{limit}".strip()
 
     @property

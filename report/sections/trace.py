@@ -10,7 +10,7 @@ from report.results.reader import Results
 from report.results.rows import named
 
 HEIGHT = 3.6  # inches
-LIMITED = r" ?at most \d+ iterations$"  # the end of a variant
+LIMITED = r" ?stopped at \d+$"  # the end of a variant
 KEPT = [
     "scene",
     "label",

@@ -39,15 +39,7 @@ TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "pyqpmad": lambda tol, gap: {"tolerance": tol, "max_iter": 1_000_000},
     "qpalm": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "eps_rel_in": 0.0, "max_iter": 1_000_000},
     "qtqp": lambda tol, gap: {"tol_feas": tol, "tol_gap_abs": gap, "tol_gap_rel": 0.0, "max_iter": 1_000},
-    "sip": lambda tol, gap: {
-        "termination": {
-            "max_absolute_residual": tol,
-            "max_absolute_duality_gap": gap,
-            "max_relative_residual": 0.0,
-            "max_relative_duality_gap": 0.0,
-        },
-        "max_iterations": 1_000,
-    },
+    "sip": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "max_iterations": 1_000},
     "scs": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "max_iters": 10_000_000},
 }
 #: The option of a limit in seconds, of those that give their last iterate then.
@@ -56,10 +48,7 @@ TIME_LIMIT = {"highs": "time_limit", "qpalm": "time_limit", "scs": "time_limit_s
 #: The settings that limit the iterations.
 LIMITS = ("max_iter", "max_iters", "maxiters", "max_iterations")
 #: The settings that print a log, where qpsolvers' `verbose` does more: checks, lines of each line search.
-LOGS: dict[str, dict[str, Any]] = {
-    "highs": {"log_to_console": True},
-    "sip": {"logging": {"print_logs": True}},
-}
+LOGS: dict[str, Any] = {"highs": {"log_to_console": True}, "sip": {"logging": {"print_logs": True}}}
 #: The solvers that overwrite P with its factor.
 OVERWRITE = ("pyqpmad",)
 
