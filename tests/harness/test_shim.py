@@ -178,7 +178,7 @@ def test_each_joint_has_shims_of_its_own(
     strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What `solve` says of each of them with its shims; the same after an interruption; the stock adds up."""
-    words, keep, kept = ("--each", "--cases", 5, "--share", 1, "--mean", 0.08), AnswerJournal._keep, [0]
+    words, keep, kept = ("--each", "--cases", 3, "--share", 1, "--mean", 0.08), AnswerJournal._keep, [0]
 
     def interrupted(self: AnswerJournal, *answer: Any) -> None:
         keep(self, *answer)
@@ -193,13 +193,13 @@ def test_each_joint_has_shims_of_its_own(
         patch.setattr(AnswerJournal, "_keep", keep)
         assert shim(strip, tmp_path / "parts", *words).exit_code in (0, 4)
     done = shim(strip, tmp_path / "whole", *words)
-    assert "of 5 joints can be kept within the limits" in done.output
+    assert "of 3 joints can be kept within the limits" in done.output
     record = record_of(tmp_path / "whole")
     assert record["joints"] == record_of(tmp_path / "parts")["joints"]
     scene = read_scene(str(strip))
     assert isinstance(scene, JointScene)
     study = session_of(strip, "4x1").study
-    cases, pieces = GapCases(count=5, mean=0.08).of(scene, "dual"), 0
+    cases, pieces = GapCases(count=3, mean=0.08).of(scene, "dual"), 0
     for joint, line in zip(
         record["joints"], pd.read_csv(tmp_path / "whole" / "joints.csv").iloc, strict=True
     ):
