@@ -228,10 +228,10 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "problems/stiffness/operator.py": {"solve(v / D) / D": ("solve(v)",)},
     "harness/placement/session.py": {
-        "gaps.max(axis=0) + errors\n": ("gaps.max(axis=0) - errors\n", "gaps.max(axis=0)\n"),
+        "gaps.max(axis=0) + errors)": ("gaps.max(axis=0) - errors)", "gaps.max(axis=0))"),
         "g + gap, u + overlap": ("g + gap, u",),
         "cases.load(k).f - self.f": ("0.0 * self.f",),
-        "self.last.data, np.zeros(len(numbers))": ("self.last.data, -1e-4 * np.ones(len(numbers))",),
+        "self.last.data, np.zeros(": ("self.last.data, -1e-4 * np.ones(",),
         "(stage.springs.k[:, None] * approaches)": ("(0 * approaches)",),
         " - overlap.T @ self.vectors[0]": (" + overlap.T @ self.vectors[0]",),
         "> LIMIT_MM).any(axis=0), np.inf": ("> LIMIT_MM).any(axis=0), 0.0",),
