@@ -18,6 +18,7 @@ from harness.results.records import Row
 from harness.verification.findings import Baseline, Finding, read_baseline, write_junit
 from harness.verification.judge import Judgement
 from harness.verification.slowdown import slowdowns
+from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 
@@ -182,6 +183,12 @@ def test_times_are_compared_beside_other_solvers(
     old, new = Side("old", timed(first, *BEFORE)), Side("new", timed(first, times, others))
     found = slowdowns(old, new, 1.5)
     assert found == ({} if slowdown is None else {measurement(first): pytest.approx(slowdown)})
+
+
+def test_single_runs_tell_nothing_of_times() -> None:
+    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
+    with pytest.raises(InputError, match="3 repeats of two solvers"):
+        slowdowns(Side("old", timed(first, [1.0], [2.0])), Side("new", timed(first, [9.0], [2.0])), 1.5)
 
 
 def test_a_slower_solver_does_not_pass(copy: Path, tmp_path: Path) -> None:

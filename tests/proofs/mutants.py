@@ -24,6 +24,16 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "max(errors.get(key, (0.0, 0.0))[0], error)": ("error",),
         "max(bound_mm, then_bound_mm)": ("bound_mm", "then_bound_mm"),
     },
+    "harness/verification/slowdown.py": {
+        'lines["ratio"] / lines["ratio_other"]': ('lines["ratio"]',),
+        'lines["ratio_least"] > lines["ratio_most_other"]': (
+            'lines["ratio_least"] > 1',
+            'lines["ratio"] > lines["ratio_most_other"]',
+            'lines["ratio_least"] > lines["ratio_other"]',
+        ),
+        "(limit < S)": ("(S > 1)",),
+        ".min(axis=1) >= ENOUGH": (".min(axis=1) >= 1",),
+    },
     "harness/verification/enclosure.py": {
         "SAFE * (U * abs(value) + self.error)": (
             "SAFE * self.error",
@@ -363,6 +373,7 @@ MUTANTS = [
 TESTS = {
     "harness/verification/enclosure.py": ("proofs/test_enclosure.py",),
     "harness/verification/findings.py": ("harness/test_gate_baseline.py",),
+    "harness/verification/slowdown.py": ("harness/test_gate_baseline.py",),
     "harness/verification/balanced_units.py": (
         "proofs/test_enclosure.py",
         "proofs/test_definite.py",
