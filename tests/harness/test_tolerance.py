@@ -26,7 +26,6 @@ from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from rivetbench import run_series, tolerance
 
-pytestmark = pytest.mark.usefixtures("without_pictures")
 SD, FORCE = "initial_gap.random.sd", "fasteners.preload"
 LIMIT, CASES = 0.5, 12
 GRID = ("--allow-gap", LIMIT, "--cases", CASES, "--share", 0.7)
@@ -48,6 +47,7 @@ def counts(path: Path, key: str, values: Sequence[float]) -> list[int]:
     return (gaps.reshape(len(values), CASES) <= LIMIT).sum(axis=1).tolist()
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(("key", "low", "high", "size"), [(SD, 0.02, 0.5, 50), (FORCE, 1.0, 600.0, 7)])
 def test_the_value_is_that_of_a_grid(tmp_path: Path, key: str, low: float, high: float, size: int) -> None:
     """The largest scatter by one command, the least force by the other."""
