@@ -74,11 +74,14 @@ def test_an_endless_import_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         isolated.check("mine", plugin, 20, 1000)
 
 
+FORK = "os.fork() or (os.setsid(), time.sleep(60))"  # the first time that a solver solves
+
+
 @pytest.mark.parametrize(
     ("at_import", "in_solve"),
     [
         ("os.fork()\natexit.register(time.sleep, 60)", f"{THREAD}; print(lam)"),
-        (f"{THREAD}; print('hello' * 10**6)", "os.fork() or (os.setsid(), time.sleep(60))"),
+        (f"{THREAD}; print('hello' * 10**6)", f"if not vars(self): self.ran = {FORK}"),
     ],
 )
 @pytest.mark.starts
