@@ -239,7 +239,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "problems/stiffness/operator.py": {"solve(v / D) / D": ("solve(v)",)},
     "harness/placement/session.py": {
         "gaps.max(axis=0) + errors)": ("gaps.max(axis=0) - errors)", "gaps.max(axis=0))"),
-        "g + gap, u + overlap": ("g + gap, u",),
+        "g + gap, u + change": ("g + gap, u",),
         "cases.load(k).f - self.f": ("0.0 * self.f",),
         "self.last.data, np.zeros(": ("self.last.data, -1e-4 * np.ones(",),
         "(stage.springs.k[:, None] * approaches)": ("(0 * approaches)",),
