@@ -9,9 +9,9 @@ no more than it grows. So, if it never lowered that of another patch, no plan th
 thinner anywhere than what growth ends in. But parts are levers: a shim may relieve its neighbours. So a plan
 is also made shim by shim, each time by the change for which (max(G, limit), mean of (Σ y⁸ / m)^⅛) is least, G
 the gap that all cases but those that may fail keep. From the better of both each shim in turn is taken out or
-made a step thinner, and the others grow; the best that is better is proven, until there is none. Plans are
-compared by their number of shims, then by Σ t · area, and tried in this order: the first that is proven is
-the best.
+made a step thinner, and the others grow; the best that is better is proven, until there is none. Then a shim
+nearby changes by a step as well. Plans are compared by their number of shims, then by Σ t · area, and tried
+in this order: the first that is proven is the best.
 
 All of this is estimated in the cases that decide about a plan: the worst ones but those that may fail, none
 of which may fail in turn; in the end all of the worst, some of which may. A plan that keeps the limit in them
@@ -19,7 +19,7 @@ is proven in all cases. If it fails there, it grows further in the cases that ar
 those that decide.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from heapq import heapify, heappop, heappush
 from itertools import product
@@ -167,10 +167,20 @@ class ShimSearch(PlanSearch):
 
     def better(self, step: Step) -> Step | None:
         """A better plan that is proven, if any: one in which the same cases fail, or else other ones."""
-        strict = self._descended(step, self.strict, self.deciding(step))
-        return strict or (self._descended(step, self, super().deciding(step)) if self.allowed else None)
+        cases, strict = self.deciding(step), self.strict
+        better = self._descended(step, strict, cases, self._fewer)
+        better = better or self._descended(step, strict, cases, self._pairs)
+        if better or not self.allowed:
+            return better
+        return self._descended(step, self, super().deciding(step), self._fewer)
 
-    def _descended(self, step: Step, search: Self, cases: tuple[int, ...]) -> Step | None:
+    def _descended(
+        self,
+        step: Step,
+        search: Self,
+        cases: tuple[int, ...],
+        moves: Callable[[Plan], list[tuple[Plan, int]]],
+    ) -> Step | None:
         """A better plan that is proven, if any, by one shim after another that is taken out or thinner, and
         by what others grow to: each time the cheapest by estimates.
         """
@@ -179,7 +189,7 @@ class ShimSearch(PlanSearch):
             plan = cheaper = base
             while cheaper:
                 plan = cheaper
-                grown = search.grown(self._fewer(plan), base, cases, self.cost(plan))
+                grown = search.grown(moves(plan), base, cases, self.cost(plan))
                 cheaper = next((one for one in grown if one not in refused), ())
             if plan == base:
                 return None
@@ -197,6 +207,17 @@ class ShimSearch(PlanSearch):
             for (k, end), now in np.ndenumerate(t)
             for option in self._thinner(now)
         ]
+
+    def _pairs(self, plan: Plan) -> list[tuple[Plan, int]]:
+        """Those plans with a shim nearby a step thicker, a step thinner or taken out, too."""
+        pairs = dict[tuple[Plan, int], None]()
+        for fewer, k in self._fewer(plan):
+            t = self.sizes(fewer)
+            for other, end in product(self.study.near[k, 1:NEAREST].tolist(), range(self.study.ends)):
+                now = float(t[other, end])
+                options = [*self._enough(now, 0.0)[:1], *self._thinner(now)]
+                pairs |= dict.fromkeys((self._with(t, other, end, option), k) for option in options)
+        return list(pairs)
 
     def grown(
         self,

@@ -31,6 +31,7 @@ from problems.effects.shims import Shims
 from problems.errors import InputError
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
+from problems.load_cases.random_gaps import random_gaps
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.reporter import SILENT
@@ -353,3 +354,30 @@ def test_a_stock_that_is_too_thin_says_where(strip: Path, tmp_path: Path) -> Non
     assert done.exit_code == 4
     for text in ("FAIL: no shims of the stock", "in patch"):
         assert text in done.output
+
+
+def test_two_shims_change_together_where_one_alone_does_not_help(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gap = "mean = 0.072\nrandom = { sd = 0.0292, correlation_length = 93.6, seed = 12 }"
+    points = "preload = 117.0\npoints = [[25.5, 63.2], [131.0, 5.19]]"
+    effects = [
+        f'[[effect]]\nkind = "{kind}"\n{text}\n'
+        for kind, text in (("initial_gap", gap), ("fasteners", points))
+    ]
+    path = tmp_path / "joint.toml"
+    path.write_text("\n".join([two_parts(length=155.0, width=77.9, nodes=(13, 4)), *effects]))
+    scene = read_scene(str(path))
+    assert isinstance(scene, JointScene)
+    patches = patches_of(scene.joint, "5x1")
+    session = PlanSession(ShimStudy(scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf), scene))
+    study = session.study
+    assert isinstance(study, ShimStudy)
+    search = ShimSearch(
+        lambda some: [session.answer(q) for q in some], 1, 0, 0.0255, study, (0.038, 0.056, 0.06)
+    )
+    _, together = search.once(())
+    monkeypatch.setattr(ShimSearch, "_pairs", lambda self, plan: [])
+    _, alone = search.once(())
+    assert together.gap_mm <= 0.0255
+    assert search.cost(together.plan) < search.cost(alone.plan)
