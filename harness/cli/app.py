@@ -15,7 +15,7 @@ import typer
 
 from harness.terminal.docstrings import docstring
 
-from .compare import compare
+from .compare import compare, merge
 from .exchange import export, import_, judge
 from .explore import explore
 from .options import NOTHING_WRITTEN, MemoryLimit, Plugin, error_reporting, option
@@ -121,8 +121,9 @@ def schema(
 
 
 app.callback(help=docstring(harness))(harness)
-ONE_SCENE: list[Callable[..., None]] = [init, validate, solve, series, tolerance, place, shim, explore]
-OTHERS: list[Callable[..., None]] = [run, report, gate, compare, check, list_, schema, export, import_, judge]
+Command = Callable[..., None]
+ONE_SCENE: list[Command] = [init, validate, solve, series, tolerance, place, shim, explore]
+OTHERS: list[Command] = [run, report, gate, compare, merge, check, list_, schema, export, import_, judge]
 for command in ONE_SCENE + OTHERS:
     app.command(command.__name__.strip("_"), help=docstring(command))(command)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import error_reporting, option
+from .options import NOTHING_WRITTEN, error_reporting, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -55,6 +55,28 @@ def compare(
         if out:
             console.print(f"Comparison: {out / 'comparison.md'}")
         raise typer.Exit(FAILED if any(comparison.worse for comparison in comparisons) else DONE)
+
+
+def merge(
+    directories: Annotated[list[str], typer.Argument(metavar="DIR...", help="Directories that `run` wrote.")],
+    out: Annotated[Path, option("DIR", "Output directory, without rows.")],
+) -> None:
+    """Put the rows of several machines into one directory, and report on each machine apart.
+
+    No ratio or mean mixes two machines. Answers stay in their own directories, where `gate` judges them.
+
+    \b
+    Example:
+      python -m harness merge laptop/default server/default --out both
+
+    \b
+    Exit codes: 0 written, 2 wrong usage or bad input,
+                5 no measurement in common, other problems or limits, or one machine measured twice.
+    """
+    with error_reporting(*NOTHING_WRITTEN) as console:
+        from harness.commands.merged_runs import merge as merge_runs
+
+        console.print(f"Report: {merge_runs(directories, out)}")
 
 
 def _show(comparison: Comparison, console: Console) -> None:

@@ -139,7 +139,7 @@ def _cells(results: Results) -> pd.DataFrame:
     cells = results.about("whole").cells
     cells = cells[cells["status"] != "unsupported"]
     cells = cells.rename(columns={"reference_bound_mm": "bound_mm"})
-    lines = roads(results)
+    lines = pd.concat(map(roads, results.by_machine()))
     if len(lines):
         lines = lines.assign(scene_s=lines[list(STAGES)].sum(axis=1, skipna=False))
         cells = cells.merge(lines[[*CELL, "scene_s"]], on=CELL, how="left")

@@ -101,7 +101,10 @@ class Results:
         if len(names) < 2:
             return [self]
         split = [self.rows[self.rows["machine"] == name].reset_index(drop=True) for name in names]
-        return [replace(self, rows=rows, cells=cells_of(rows)) for rows in split]
+        of = self.problems["machine"] if "machine" in self.problems else pd.Series(None, self.problems.index)
+        problems = [self.problems[of.isna() | (of == name)] for name in names]
+        pairs = zip(split, problems, strict=True)
+        return [replace(self, rows=rows, cells=cells_of(rows), problems=own) for rows, own in pairs]
 
 
 def read(directory: Path) -> Results:

@@ -1,0 +1,40 @@
+"""Puts the rows of several runs, as of several machines, into one directory."""
+
+import shutil
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from harness.measurement.suite_run import record_machine
+from harness.results import records
+from harness.results.comparison import Incomparable, read_side, refuse_incomparable
+from harness.verification.reference_problem import PROBLEMS
+from problems.errors import InputError
+
+from .suite_runs import SUITE, report
+
+
+def merge(names: Sequence[str], out: Path) -> Path:
+    """Write a directory of the rows of runs that share measurements, each with its machine; its report.
+
+    Answers stay where they are. Raises InputError; Incomparable if a machine made a measurement in two runs.
+    """
+    sides = [read_side(name) for name in names]
+    for side in sides[1:]:
+        refuse_incomparable(sides[0], side)
+    rows = [row | dict.fromkeys(("answer", "log")) for side in sides for row in side.rows]
+    ((place, count),) = Counter((row.get("key"), row.get("machine")) for row in rows).most_common(1)
+    if count > 1:
+        raise Incomparable.one(" ".join(names), "key", place[0], f"one row of {place[1]}, not {count}")
+    if (out / records.MEASUREMENTS).exists():
+        raise InputError.one("--out", "directory", str(out), f"has rows: {records.OTHER}")
+    with records.locked(out):
+        for folder, side in zip(map(Path, names), sides, strict=True):
+            of_machine = {"machine": side.rows[0].get("machine")}
+            for file in sorted(folder.glob("machine*.json")):
+                record_machine(out, records.parsed(file.read_bytes()))
+            records.append(out / PROBLEMS, *(row | of_machine for row in records.read(folder / PROBLEMS)))
+            for file in (*folder.glob("scenes/*.npz"), *folder.glob(SUITE)):
+                shutil.copy(file, out / file.relative_to(folder))
+        records.append(out / records.MEASUREMENTS, *rows)
+    return report(out)

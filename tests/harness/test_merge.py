@@ -1,0 +1,78 @@
+"""`merge`: rows of two machines in one directory; nothing is compared across them."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commands import harness
+from synthetic_results import row, write_rows
+
+from harness.results import records
+from report.analysis.time_to_solution import roads
+from report.results.reader import read
+
+FAST, SLOW = "A fast CPU, 64 cores", "A slow CPU, 1 core"
+LOW, HIGH = "4386/0052", "4386/1074"
+SHARED = {"key": f"{LOW} shared", "solver": "gi"}
+
+
+def machine(folder: Path, name: str, seconds: float, *rows: dict[str, Any]) -> Path:
+    """A run of rows that all take so many seconds, as each of its matrices does."""
+    times = {"machine": name, "solve_s": seconds, "setup_s": 0.0, "form_s": 0.0, "answer": "answers/a.npz"}
+    folder.mkdir()
+    write_rows(folder, [each | times for each in (row(**SHARED), *rows)])
+    build = {step: seconds for step in ("condensation", "cholesky", "Q")}
+    problem = {"scene": LOW, "title": "A scene", "n": 4386, "m": 2193, "build_s": build}
+    (folder / "problems.jsonl").write_text(json.dumps(problem) + "\n")
+    (folder / "machine.json").write_text(json.dumps({"machine": name, "cores": 1}))
+    (folder / "suite.toml").write_text('name = "two"\nscenes = ["4386/0107"]\nsolver = [{ name = "gi" }]\n')
+    return folder
+
+
+@pytest.fixture
+def both(tmp_path: Path) -> tuple[Path, Path]:
+    sparse = {"form": "sparse", "model_s": 0.0}
+    own = [row(LOW, "fast", key="fast"), row(LOW, "fast", key="fast sparse", **sparse)]
+    others = [row(LOW, "slow", key="slow"), row(LOW, "slow", key="slow sparse", **sparse)]
+    return machine(tmp_path / "fast", FAST, 2.0, *own), machine(tmp_path / "slow", SLOW, 1446.0, *others)
+
+
+def test_no_ratio_is_of_two_machines(both: tuple[Path, Path], tmp_path: Path) -> None:
+    """One machine takes 723 times as long for everything: no table or page says so."""
+    out = tmp_path / "both"
+    done = harness("merge", *both, "--out", out)
+    assert done.exit_code == 0, done.output
+    rows = records.read(out / records.MEASUREMENTS)
+    assert [each["machine"] for each in rows] == [FAST] * 3 + [SLOW] * 3
+    assert {each["answer"] for each in rows} == {None}
+    assert {json.loads(path.read_text())["machine"] for path in out.glob("machine*.json")} == {FAST, SLOW}
+    text = (out / "report" / "report.md").read_text("utf-8")
+    tables = text + "".join(path.read_text("utf-8") for path in (out / "report").glob("*.csv"))
+    numbers = {float(number) for number in re.findall(r"(?<![\w.-])\d+(?:\.\d+)?(?![\w.])", tables)}
+    assert {1.0, 2.0, 1446.0} <= numbers
+    assert not any(723 * 0.99 < each < 723 * 1.01 or 0 < abs(each - 1 / 723) < 1e-5 for each in numbers)
+    assert f"Summary: {FAST}" in text
+    assert f"Summary: {SLOW}" in text
+    results = read(out)
+    for part in results.by_machine():
+        seconds = 2.0 if part.rows["machine"].iloc[0] == FAST else 1446.0
+        assert set(part.cells["load_case_s"]) == {seconds}
+        assert set(part.problems["machine"]) == set(part.rows["machine"])
+        dense = roads(part)[lambda lines: lines["form"] == "dual"]
+        assert set(dense["K_s"]) == {seconds}
+
+
+def test_runs_that_do_not_belong_together_are_refused(both: tuple[Path, Path], tmp_path: Path) -> None:
+    fast, slow = both
+    out = tmp_path / "both"
+    assert harness("merge", fast, fast, "--out", out).exit_code == 5
+    other = machine(tmp_path / "other", "A third", 1.0)
+    write_rows(other, [row(HIGH, "gi", key="other")])
+    done = harness("merge", fast, other, "--out", out)
+    assert (done.exit_code, out.exists()) == (5, False)
+    write_rows(other, [row(**SHARED, limit_mm=1e-3)])
+    assert "another limit" in harness("merge", fast, other, "--out", out).stderr
+    assert harness("merge", fast, slow, "--out", fast).exit_code == 2
+    assert harness("merge", fast, tmp_path / "none", "--out", out).exit_code == 2
