@@ -235,6 +235,7 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
         needed = 1 - failing / count if cases is gaps or share == 1 else low
         assert passed == (needed >= share)
         assert f"interval {100 * low:.1f} to " in words
+        assert ("no shim is needed" in words) == (not failing)
 
 
 def proportion(kept: int, count: int) -> tuple[float, float]:
