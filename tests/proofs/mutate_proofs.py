@@ -19,7 +19,7 @@ from pathlib import Path
 from mutants import MUTANTS, TESTS, Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("rivetbench", "harness", "problems", "solvers", "report", "tests")
+PACKAGES = ("rivetbench", "harness", "problems", "solvers", "report", "tests", "examples")
 LIMIT_S = 300.0
 
 
