@@ -81,7 +81,7 @@ def test_monotone_regression_is_that_of_pooling_lines_in_turn() -> None:
 @pytest.mark.parametrize("k", DRAWS)
 def test_the_answer_to_random_rows_is_exact(k: int) -> None:
     made = made_of(make_rung(f"sparse/rows/500-{k}"))
-    assert is_exact(replace(made, assembly=replace(made.assembly, K=made.assembly.K.as_dense())), 2**20)
+    assert is_exact(replace(made, assembly=replace(made.assembly, K=made.assembly.K.as_dense())))
 
 
 def test_bricks_have_the_energy_of_a_uniform_strain() -> None:
