@@ -229,7 +229,7 @@ class ShimSearch(PlanSearch):
         """What plans grow to, each with the number of a patch that does not, if that keeps the limit by
         estimates and costs less; the cheapest first. base : see Question.
         """
-        waiting = [(self.cost(plan), plan, held) for plan, held in starts]
+        waiting = [entry for plan, held in starts if (entry := (self.cost(plan), plan, held))[0] < below]
         kept, seen = list[tuple[tuple[float, float], Plan]](), set(waiting)
         heapify(waiting)
         while waiting or kept:

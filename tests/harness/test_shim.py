@@ -382,3 +382,50 @@ def test_two_shims_change_together_where_one_alone_does_not_help(
     _, alone = search.once(())
     assert together.gap_mm <= 0.0255
     assert search.cost(together.plan) < search.cost(alone.plan)
+
+
+class FewFigures(ShimSearch):
+    """Each patch of 1 mm² asks for `needs` in one case, and in another, which may fail, for 0.09 mm more."""
+
+    needs = (0.03, 0.0, 0.05, 0.0)
+
+    def outcomes(self, plans: Any, cases: Any, most: int, base: Any = None) -> list[Outcome]:
+        made = []
+        for plan in plans:
+            left = self.limit_mm + np.array(self.needs) - self.sizes(plan)[:, 0]
+            rows = [(*gap, 0.0, *[0.0] * 5, *gap, 0.0, 0.0) for gap in (left, left + 0.09)]
+            made.append(Outcome(tuple(max(row) for row in rows), (0, 0), (0.0, 0.0), tuple(rows)))
+        return made
+
+
+def test_growth_gives_what_the_gaps_ask_for_in_all_cases_but_those_that_may_fail(strip: Path) -> None:
+    """And yields plans by their cost, whatever they begin with."""
+    study = session_of(strip, "4x1").study
+    assert isinstance(study, ShimStudy)
+    search = FewFigures(lambda some: [], 2, 1, 0.08, study, (0.01, 0.02, 0.03, 0.04, 0.05, 0.06))
+    (outcome,) = search.outcomes([()], range(2), 50)
+    assert search.thicker((), outcome) == ((0, 0.03), (2, 0.05))
+    assert search.thicker(((0, 0.01), (1, 0.02)), search.outcomes([((0, 0.01), (1, 0.02))], (), 0)[0]) == (
+        (0, 0.03),
+        (1, 0.02),
+        (2, 0.05),
+    )
+    assert search.thicker((), outcome, held=2) == ()
+    whole = [((0, 0.03), (1, t), (2, u)) for t in (0.06, 0.03, 0.01) for u in (0.06, 0.05, 0.01)]
+    costs = list(map(search.cost, search.grown([(plan, -1) for plan in [*whole, ((3, 0.01),)]], (), (0, 1))))
+    assert costs == sorted(costs)
+    assert len(costs) > 5
+    limit = search.cost(((0, 0.03), (1, 0.02), (2, 0.06)))
+    below = search.grown([(plan, -1) for plan in [*whole, ((3, 0.01),)]], (), (0, 1), limit)
+    assert max(map(search.cost, below)) < limit <= max(costs)
+
+
+def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:
+    (tmp_path / "half.csv").write_text("x_min,x_max,y_min,y_max\n0,60,0,50\n")
+    study = session_of(strip, str(tmp_path / "half.csv")).study
+    assert isinstance(study, ShimStudy)
+    session = PlanSession(study)
+    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, 0.1, study, STOCK)
+    (outcome,) = search.outcomes([((0, 0.02),)], [0], 50)
+    inside, beyond = outcome.further[0][:2]
+    assert inside < beyond == outcome.largest[0]
