@@ -70,7 +70,8 @@ class Overrides:
 def overridden(suite: Suite, change: Overrides) -> Suite:
     """The suite with the command line's changes. Raises InputError, all faults at once.
 
-    --scene replaces the suite's scenes; --size keeps those of that size; --solver keeps those entries and
+    --scene replaces the suite's scenes, and each entry is measured on those that the suite does not have,
+    whatever its own scenes; --size keeps those of that size; --solver keeps those entries and
     adds a default one for a solver that is not in the suite; --with does so for its library, and takes each
     entry once in each version; --plugin adds its solver.
     """
@@ -107,7 +108,10 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     data |= changes
     if "time_limit_s" in changes:
         data.pop("time_limit_by_size_s", None)
+    others = [scene for scene in data["scenes"] if scene not in suite.scenes]
     for entry in data["solver"]:
+        if "scenes" in entry:
+            entry["scenes"] = [*entry["scenes"], *others]
         if change.forms:
             entry["forms"] = list(change.forms)
         for key in changes:  # of the suite: they override the entry's

@@ -253,3 +253,11 @@ def test_versions_that_could_not_be_told_apart_are_refused(tmp_path: Path) -> No
     other = '[[solver]]\nname = "piqp"\nvariant = "plain 0.6.2"\n'
     with pytest.raises(InputError, match="other `with` under this variant"):
         read_suite(str(tiny_joint.write_suite(tmp_path, TWO + 'with = ["piqp==0.6.2"]\n' + other)))
+
+
+def test_a_scene_from_outside_is_for_every_entry(tmp_path: Path) -> None:
+    """The scenes of an entry are some of the suite's own."""
+    suite, every = read_suite("default"), {entry.name for entry in read_suite("default").solver}
+    planned = expand(overridden(suite, Overrides(scenes=("scaling/1170", "11308/0220"))))
+    assert {m.solver for m in planned if m.scene == "scaling/1170"} == every
+    assert {m.solver for m in planned if m.scene == "11308/0220"} < every
