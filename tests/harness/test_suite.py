@@ -255,7 +255,7 @@ def test_versions_that_could_not_be_told_apart_are_refused(tmp_path: Path) -> No
         read_suite(str(tiny_joint.write_suite(tmp_path, TWO + 'with = ["piqp==0.6.2"]\n' + other)))
 
 
-def test_a_scene_from_outside_is_for_every_entry(tmp_path: Path) -> None:
+def test_a_scene_from_outside_is_for_every_entry() -> None:
     """The scenes of an entry are some of the suite's own."""
     suite, every = read_suite("default"), {entry.name for entry in read_suite("default").solver}
     planned = expand(overridden(suite, Overrides(scenes=("scaling/1170", "11308/0220"))))
