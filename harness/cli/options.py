@@ -91,7 +91,8 @@ Scheduler = Annotated[
 
 
 Share = Annotated[
-    float | None, option("SHARE", "Of the cases that must keep the limits.  [default: 0.95; of one, 1]")
+    float | None,
+    option("SHARE", "Of the cases that must keep the limits.  [default: 0.95; of one, 1]", min=0.01),
 ]
 Resolution = Annotated[float | None, option("SHARE", "Of the range that is told apart.  [default: 0.01]")]
 

@@ -104,11 +104,10 @@ def series(
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         cases = replace(source(), contributors=contributors)
         settings = SeriesOptions(solver, form, *accuracy, threads, plugin, *limits)
-        if find or share is not None or resolution:
+        if find or share is not None or resolution is not None:
             if sweep or not find or allow_gap is None:
                 raise InputError.one("--find", "KEY=LOW:HIGH", find, "with --allow-gap, without --sweep")
-            wanted = 0.95 if share is None else share
-            goal, told = (allow_gap, wanted, resolution or 0.01), ConsoleReporter(console, plain=True)
+            goal, told = (allow_gap, share, resolution), ConsoleReporter(console, plain=True)
             answer = find_limit(scene, out, find, *goal, cases, settings, scheduler, told)
             kind = "pass" if answer.passed else "fail"
             raise typer.Exit(show_verdict(kind, answer.sentences, console))

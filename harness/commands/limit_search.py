@@ -24,7 +24,7 @@ from harness.measurement.scheduler import shared, threads_per_worker
 from harness.results import records, series_file
 from harness.results.atomic_output import refuse_inputs
 from harness.results.schema import SERIES
-from harness.scene.allowed_gap import CONFIDENCE, refuse_unusable, share_interval
+from harness.scene.allowed_gap import CONFIDENCE, SHARE, refuse_unusable, share_interval
 from harness.series.load_case_source import DEFAULT, GapCases
 from harness.series.session import SeriesOptions
 from harness.solving.call_lock import keeps_threads
@@ -39,6 +39,7 @@ from problems.scene_files import read_scene
 from .load_case_series import run_series
 
 RECORD = "tolerance.json"
+RESOLUTION = 0.01  # of the range, by default
 UNCHECKED = SeriesOptions(check=0)
 
 
@@ -71,8 +72,8 @@ def tolerance(
     out: str | Path,
     find: str,
     allow_gap_mm: float,
-    share: float = 0.95,
-    resolution: float = 0.01,
+    share: float | None = None,
+    resolution: float | None = None,
     cases: GapCases = DEFAULT,
     options: SeriesOptions = UNCHECKED,
     scheduler: str | None = None,
@@ -92,9 +93,9 @@ def tolerance(
     allow_gap_mm : float
         The largest gap allowed, mm.
     share : float, optional
-        Share of the joints that must keep it, above 0, at most 1.
+        Share of the joints that must keep it, above 0, at most 1; by default 0.95.
     resolution : float, optional
-        Distance of neighbouring values, as a share of the range.
+        Distance of neighbouring values, as a share of the range; by default 0.01.
     cases : GapCases, optional
         The load cases, the same for every value; by default 100 with random gaps.
     options : SeriesOptions, optional
@@ -123,6 +124,7 @@ def tolerance(
     True
     """
     read, directory = read_scene(str(scene)), Path(out)
+    share, resolution = SHARE if share is None else share, RESOLUTION if resolution is None else resolution
     keys = keys_of(read, stiffness=True) if isinstance(read, JointScene) else {}
     name, _, ends = find.partition("=")
     try:
@@ -164,12 +166,14 @@ def tolerance(
     @cache
     def kept(value: float, seed: int | None = None) -> int:
         """In how many cases a value keeps the limit."""
-        keeps, which = bounds(value, seed) <= allow_gap_mm, "fresh cases" if seed else "cases"
-        (low, high), k = share_interval(int(keeps.sum()), len(keeps)), int(keeps.sum())
-        figures = {"value": value, "cases": len(keeps), "kept": k, "share": k / len(keeps)}
-        shares.append(figures | {"low": low, "high": high, "fresh": bool(seed)})
-        reporter.say(f"{name} = {value:g}: within {allow_gap_mm:g} mm in {k} of {len(keeps)} {which}")
-        return k
+        keeps = bounds(value, seed) <= allow_gap_mm
+        count, total = int(keeps.sum()), len(keeps)
+        low, high = share_interval(count, total)
+        figures = {"value": value, "cases": total, "kept": count, "share": count / total}
+        shares.append(figures | {"low": low, "high": high, "fresh": seed is not None})
+        which = "cases" if seed is None else "fresh cases"
+        reporter.say(f"{name} = {value:g}: within {allow_gap_mm:g} mm in {count} of {total} {which}")
+        return count
 
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
     with records.locked(directory, (), other=SERIES), shared(scheduler, console_of(reporter)) as address:

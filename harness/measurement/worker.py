@@ -116,9 +116,8 @@ class Run(Reporter):
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
         solver = make_solver(m.solver, m.entry.options, plugin)
-        vars(solver).update(prints=True, time_limit_s=OWN_LIMIT * m.time_limit_s)  # it may be frozen
-        if m.iteration_limit is not None:
-            vars(solver)["iteration_limit"] = m.iteration_limit
+        own = {"time_limit_s": OWN_LIMIT * m.time_limit_s, "iteration_limit": m.iteration_limit}
+        vars(solver).update(own, prints=True)  # it may be frozen
         if m.form not in solver.forms:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.step("load_s"):

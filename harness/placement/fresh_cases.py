@@ -23,13 +23,12 @@ from math import ceil, floor, log, log10
 
 from harness.placement.candidates import Plan
 from harness.placement.plan_search import PlanSearch, Step
-from harness.scene.allowed_gap import CONFIDENCE, share_interval
+from harness.scene.allowed_gap import CONFIDENCE, SHARE, share_interval
 from problems.errors import InputError
 from report.document.numbers import counted
 
 ALPHA = 0.05
 POWER = 0.8
-SHARE = 0.95
 ROUNDS = 4
 MOST = 10**7  # fresh cases
 

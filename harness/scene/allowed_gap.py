@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 CHECK = "allowed_gap"  # in the facts of a series
 CONFIDENCE = 0.95  # of the interval for a share
+SHARE = 0.95  # of the cases that must keep a limit, by default
 ROUNDING = 2.0**-24
 
 

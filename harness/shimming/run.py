@@ -293,11 +293,10 @@ def _figures(study: ShimStudy, before: Sequence[Outcome], after: Sequence[Outcom
         when: dict(zip(names, (some[:, : count + 1].max(), *some[:, -2:].max(axis=0)), strict=True))
         for when, some in {"before": old, "after": new}.items()
     }
-    places = np.concatenate([joint.places(pair) for pair in joint.pairs])
     contacts = [contact for one in after for contact in one.contact]
     worst = contacts[int(new[:, : count + 1].max(axis=1).argmax())]
     drawn = {"bounds": joint.bounds.tolist(), "marks": study.bare.marks().tolist()}
-    return {"patches": patches, **whole, **drawn, "worst_at": position(places[worst], places)}
+    return {"patches": patches, **whole, **drawn, "worst_at": position(study.places[worst], study.places)}
 
 
 def _record(result: Found, study: ShimStudy) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from harness.placement.candidates import Place
 from harness.placement.session import CaseAnswer, Study
 from harness.scene.stress import largest_of
 from problems.effects.shims import Shims
-from problems.forms.assembly import Indices, Mask, Vector
+from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.model.fastener_forces import fastener_forces, force_error_per_mm
 from problems.model.scene import JointScene
 from problems.model.surface import surface_of
@@ -41,6 +41,11 @@ class ShimStudy(Study):
         return self.patches[k].shim.model_copy(update={"thickness": thickness})
 
     @cached_property
+    def places(self) -> Matrix:
+        """(m, 2) of the contacts, mm."""
+        return np.concatenate([self.bare.joint.places(pair) for pair in self.bare.joint.pairs])
+
+    @cached_property
     def masks(self) -> list[Mask]:
         """The contacts of each patch, and those of none."""
         inside = [patch.shim.gap(self.bare.joint) < 0 for patch in self.patches]
@@ -51,16 +56,14 @@ class ShimStudy(Study):
         """The contacts that each thickness is for: those of its patch, or of the half at its end."""
         if self.ends == 1:
             return self.masks[:-1]
-        nodes = np.concatenate([self.bare.joint.places(pair) for pair in self.bare.joint.pairs])
-        along = [patch.shim.along(nodes) for patch in self.patches]
+        along = [patch.shim.along(self.places) for patch in self.patches]
         pairs = zip(self.masks, along, strict=False)
         return [half for mask, at in pairs for half in (mask & (at <= 0.5), mask & (at >= 0.5))]
 
     @cached_property
     def near(self) -> Indices:
         """(patches, patches) the numbers of all patches, to each patch the nearest first."""
-        nodes = np.concatenate([self.bare.joint.places(pair) for pair in self.bare.joint.pairs])
-        middles = np.array([nodes[mask].mean(axis=0) for mask in self.masks[:-1]])
+        middles = np.array([self.places[mask].mean(axis=0) for mask in self.masks[:-1]])
         distances = np.linalg.norm(middles[:, None] - middles, axis=2)
         return np.argsort(distances, axis=1, kind="stable")
 

@@ -35,7 +35,7 @@ class SuperLU:
     @property
     def nonzeros(self) -> int:
         """The float64 that L and U hold."""
-        return int(self.lu.L.nnz + self.lu.U.nnz)
+        return int(self.lu.nnz)  # its L and U would be copies, which it then keeps
 
     def backward_error(self) -> float | None:
         """A bound on ‖E‖₂, up to its rounding, of an E with K + E positive definite; None if there is none.
