@@ -253,11 +253,13 @@ def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.
     lines = []
     for scene, seconds in proven.items():
         of_scene = compared(rows[(rows["scene"] == scene) & rows["case"].notna()])
-        fastest = {owner: of_fastest(owner, of_scene, "later_s", "cold_s").min() for owner in OWNERS[1:]}
+        measured = [owner for owner in OWNERS[1:] if owner in {*of_scene["owner"]}]
+        fastest = dict.fromkeys(OWNERS[1:], np.nan) | {
+            owner: of_fastest(owner, of_scene, "later_s", "cold_s").fillna(np.inf).min() for owner in measured
+        }
         line = {"question": IN_SERIES, "n": of_scene["n"].min()}
         lines.append(line | against_ours(pd.DataFrame([{"ours": seconds.mean()} | fastest])))
         lines[-1] |= {"seconds_most": seconds.max()}
-        lines[-1] |= dict.fromkeys({*OWNERS[1:]} - {*of_scene["owner"]}, np.nan)
     return pd.DataFrame(lines)
 
 

@@ -58,8 +58,8 @@ def how_fast_table(table: pd.DataFrame, machines: str = "") -> Table:
     caption = (
         "*How fast is it?* From the scene on: condensation, factors, Q and preparation included where a form "
         "needs them. Seconds of the fastest of ours, the median over the scenes; the others as multiples of "
-        "it, the median (the least). A scene on which none of them is within the limit counts as more than "
-        f"all others.{machines}"
+        "it, the median (the least), over the scenes on which they were measured. One on which none of them "
+        f"is within the limit counts as more than all others.{machines}"
     )
     return Table("how-fast", caption, table, columns, keys=2)
 
@@ -83,7 +83,8 @@ def ours_and_others(results: Results) -> pd.DataFrame:
 
     seconds, seconds_most : of the fastest of ours, the median and the worst scene
     library, library_least : how many times as long the fastest library takes, the median and the least
-    library_none : the scenes on which no library is within the limit; they count as more than all others
+    library_none : the scenes on which libraries were measured and none is within the limit; they count as
+        more than all others, scenes without a library not at all
     textbook, … : the same for the textbook methods
 
     What was measured beside a round of ours (suite.py, `beside`) is compared with the fastest of that round.
@@ -92,14 +93,15 @@ def ours_and_others(results: Results) -> pd.DataFrame:
     ways = roads(replace(results, rows=pd.concat([results.rows, results.rounds], ignore_index=True)))
     if ways.empty or not set(OWNERS) <= set(ways["owner"]):
         return pd.DataFrame()
-    ways = ways[ways["verdict"] == "within"]
+    within = ways["verdict"] == "within"
     beside = ways["round"].where(ways["round"] != "", ways["beside_round"])
     at, ours, lines = [ways["machine"], ways["scene"], beside], ways["owner"] == "ours", []
     for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
-        own = ways[seconds].where(ours)
+        taken = ways[seconds].where(within).fillna(np.inf)
+        own = taken.where(ours & np.isfinite(taken))
         alone = own.where(beside == "").groupby(ways["scene"]).transform("min")
-        times = (ways[seconds] / own.groupby(at).transform("min")).where(ways["round"] == "")
-        ways = ways.assign(fastest=times * alone)
+        times = (taken / own.groupby(at).transform("min")).where(ways["round"] == "")
+        ways = ways.assign(fastest=(times * alone).where(np.isfinite(taken) | ~ours))
         fastest = ways.groupby(["n", "scene", "owner"])["fastest"].min().unstack("owner")
         solved = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
         lines += [
@@ -109,13 +111,15 @@ def ours_and_others(results: Results) -> pd.DataFrame:
 
 
 def against_ours(fastest: pd.DataFrame) -> dict[str, Any]:
-    """The figures of one question. fastest : seconds, a row per scene, a column per owner."""
+    """The figures of one question. fastest : seconds, a row per scene, a column per owner; infinite where
+    none is within the limit, not a number where none was measured.
+    """
     line: dict[str, Any] = {"scenes": len(fastest), "seconds": fastest["ours"].median()}
     line["seconds_most"] = fastest["ours"].max()
     for owner in OWNERS[1:]:
         times = fastest[owner] / fastest["ours"]
-        line |= {owner: times.fillna(float("inf")).median(), f"{owner}_least": times.min()}
-        line[f"{owner}_none"] = int(times.isna().sum())
+        line |= {owner: times.median(), f"{owner}_least": times[np.isfinite(times)].min()}
+        line[f"{owner}_none"] = int(np.isinf(times).sum())
     return line
 
 

@@ -54,6 +54,13 @@ def test_the_fastest_of_each_owner_scene_by_scene(tmp_path: Path) -> None:
     assert first["textbook_least"] == pytest.approx(7.4 / 1.5)
 
 
+def test_scenes_without_a_library_do_not_count_against_libraries(tmp_path: Path) -> None:
+    made = [r for r in rows() if (r["owner"], r["scene"]) != ("library", "4386/1")]
+    ratios = table(tmp_path, made).loc[ONE_MORE]
+    assert (ratios["library"], ratios["library_none"]) == (pytest.approx(30.0), 0)
+    assert (ratios["scenes"], ratios["textbook"]) == (2, pytest.approx(3.5))
+
+
 def test_a_round_on_a_slower_machine_has_the_same_ratios(tmp_path: Path) -> None:
     """What was measured beside it is compared with it alone; ours in seconds is what stands by itself."""
     when, made = "2026-01-01T00:00:00+00:00", []
