@@ -12,9 +12,9 @@ FEWEST = 3  # scenes
 HEIGHT = 3.6  # inches
 CAPTION = (
     "*Performance profile* (Dolan and Moré, 2002), with the best tolerance on each scene. Read it so: the "
-    "height of a curve at τ is the share of the scenes that the solver answers within {} in at most τ times "
+    "height of a curve at τ is the share of its scenes that the solver answers within {} in at most τ times "
     "the seconds of the fastest, preparation included. At τ = 1 that is the share on which it is the "
-    "fastest, at the right end the share that it answers at all."
+    "fastest, at the right end the share that it answers at all. Its scenes are those it was measured on."
 )
 
 
@@ -36,9 +36,11 @@ def section(results: Results) -> Section | None:
 
 def profile(cells: pd.DataFrame) -> pd.DataFrame:
     """The ratios of `total_s` to the fastest on a scene, by method, ascending, each with the share of the
-    scenes on which the method's ratio is at most that.
+    scenes measured on which the method's ratio is at most that.
     """
+    cells = cells.assign(scenes=cells.groupby("method")["scene"].transform("nunique"))
     good = cells[cells["verdict"] == "within"]
     ratio = good["total_s"] / good.groupby("scene")["total_s"].transform("min")
-    lines = good[["method", "scene"]].assign(ratio=ratio).sort_values(["method", "ratio"], ignore_index=True)
-    return lines.assign(share=(lines.groupby("method").cumcount() + 1) / cells["scene"].nunique())
+    lines = good[["method", "scene", "scenes"]].assign(ratio=ratio)
+    lines = lines.sort_values(["method", "ratio"], ignore_index=True)
+    return lines.assign(share=(lines.groupby("method").cumcount() + 1) / lines["scenes"])

@@ -80,6 +80,8 @@ def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_pat
     a = [["a (dual)", ratio, share] for ratio, share in ((1, 0.25), (1, 0.5), (2, 0.75), (2, 1.0))]
     assert lines == [*a, *(["b (dual)", ratio, share] for ratio, share in ((1, 0.25), (1, 0.5), (3, 0.75)))]
     assert profile.section(results(tmp_path / "two", rows[:2])) is None
+    fewer = profile.profile(results(tmp_path / "fewer", rows[:6]).cells)  # b on two scenes alone
+    assert fewer.loc[fewer["method"] == "b (dual)", "share"].tolist() == [0.5, 1.0]
 
 
 def test_a_log_is_linked_where_it_is_one_of_the_run(tmp_path: Path) -> None:
