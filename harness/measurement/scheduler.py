@@ -96,14 +96,21 @@ def _uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def _silent_if_interrupted(client: Any) -> Iterator[None]:
-    """Silence Dask after an interrupt: it would log each task that was cut off."""
+    """Silence Dask after an interrupt: it would log each task that was cut off, also after its end."""
     try:
         yield
     except KeyboardInterrupt:
         logging.disable()
+        logging.getLogger("tornado.application").addFilter(_is_of_an_open_connection)
         with suppress(OSError):  # they have ended
             client.run(logging.disable, on_error="ignore")
         raise
+
+
+def _is_of_an_open_connection(record: logging.LogRecord) -> bool:
+    from distributed.comm.core import CommClosedError
+
+    return not (record.exc_info and isinstance(record.exc_info[1], CommClosedError))
 
 
 def local_workers(scheduler: str | None) -> int | None:
