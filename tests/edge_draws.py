@@ -170,8 +170,9 @@ def _card(width: str, fields: list[str]) -> str:
 
 def op4(draw: Draw, matrices: Mapping[str, Any], path: Path) -> None:
     """Written by pyyeti: text or binary, dense or sparse; text then as others write it."""
-    from pyyeti.nastran import op4 as writer
+    from problems.formats.nastran import pyyeti
 
+    writer = pyyeti(path).op4
     names, arrays, forms = [], [], []
     for name, M in matrices.items():
         M = np.asarray(M, dtype=float).reshape(len(M), -1)
