@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import product
+from math import inf
 from typing import Any
 
 from problems.errors import Fault, InputError
@@ -25,6 +26,7 @@ ROUND = " round="  # before the time, in the keys of a round
 #: After which a trace stops a solver.
 ITERATION_LIMITS = [2**k for k in range(20)]
 BEST = 1.0
+QUICK = 0.1  # of the time limit: what the other scenes of a size may take
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,10 @@ class Measurement:
 
     entry : the settings, one of the suite's. scene : the name in the tables; source : a name or an absolute
     path for `read_scene`. case : the number of the load case in a series. guide : the scene whose rows decide
-    whether a library's form is measured on this one, and how many times as long as its best it may take there
-    (tolerance_search.py); None if all forms are. round : when a round began, in which an entry with `beside`
-    is measured again; beside_round : the round beside which this one is measured. iteration_limit : in a
-    trace, after which the solver stops.
+    whether a library's form is measured on this one, how many times as long as its best it may take there,
+    and how many seconds (tolerance_search.py); None if all forms are. round : when a round began, in which an
+    entry with `beside` is measured again; beside_round : the round beside which this one is measured.
+    iteration_limit : in a trace, after which the solver stops.
     """
 
     suite: Suite
@@ -49,7 +51,7 @@ class Measurement:
     repeat: int
     time_limit_s: float
     case: int | None = None
-    guide: tuple[str, float] | None = None
+    guide: tuple[str, float, float] | None = None
     round: str = ""
     beside_round: str = ""
     iteration_limit: int | None = None
@@ -153,19 +155,20 @@ def expand(suite: Suite) -> list[Measurement]:
     return list(plan.values())
 
 
-def _guides(suite: Suite, scenes: Sequence[Scene]) -> dict[str, tuple[str, float] | None]:
+def _guides(suite: Suite, scenes: Sequence[Scene]) -> dict[str, tuple[str, float, float] | None]:
     """The guide of each scene in a suite with `times_best_form`: of the first of a size, the first of the
-    next smaller size; of each other one, the first of its size, where the form must have been the best.
+    next smaller size; of each other one, the first of its size, where the form must have been the best, and
+    quick.
     """
     sizes = {scene.name: (scene.expected_size or (0, 0))[0] for scene in scenes}
     first = {sizes[scene.name]: scene.name for scene in reversed(scenes)}
-    guides: dict[str, tuple[str, float] | None] = dict.fromkeys(sizes)
+    guides: dict[str, tuple[str, float, float] | None] = dict.fromkeys(sizes)
     for name, n in sizes.items() if suite.times_best_form else ():
         smaller = max((size for size in first if size < n), default=None)
         if name != first[n]:
-            guides[name] = first[n], BEST
+            guides[name] = first[n], BEST, QUICK * suite.time_limit(n)
         elif smaller is not None:
-            guides[name] = first[smaller], suite.times_best_form or BEST
+            guides[name] = first[smaller], suite.times_best_form or BEST, inf
     return guides
 
 

@@ -3,7 +3,8 @@
 tolerances = "auto" searches for the loosest tolerance whose answer is within the limit on the scene.
 repeats = "auto" repeats what is quick. times_best_form = k measures a library in all its forms on the first
 scene of the smallest size; on the first scene of each other size in those that took at most k times as long
-as its best on the first scene of the next smaller size; on the other scenes in the best of the first.
+as its best on the first scene of the next smaller size; on the other scenes in the best of the first, if that
+took at most a tenth of the time limit.
 """
 
 from collections.abc import Sequence
@@ -47,13 +48,15 @@ def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
 
 def in_a_good_form(m: Measurement, rows: Sequence[Row]) -> bool:
     """Whether m's form was good enough on the scene that guides m, or nothing is known of it there."""
-    scene, times = m.guide or ("", inf)
+    scene, times, most_s = m.guide or ("", inf, inf)
     seconds: dict[str, float] = {}
     for row in rows:
         if row["scene"] == scene and row["owner"] == "library" and m.same_settings(row | {"form": m.form}):
             own = _seconds(row) if row["verdict"] == "within" else inf
             seconds[row["form"]] = min(own, seconds.get(row["form"], inf))
     best = min(seconds.values(), default=inf)
+    if most_s < best < inf:
+        return False
     return not seconds or (m.form in seconds and seconds[m.form] <= times * best)
 
 
