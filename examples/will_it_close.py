@@ -1,6 +1,6 @@
 """The same joint with two plans of fasteners: which gap is left, and is it small enough?
 
-    python examples/will_it_close.py [FILE.png]      draws the maps of the README into FILE.png
+    python examples/will_it_close.py [FILE.png]      draws the maps of docs/decide.md into FILE.png
 
 It calls `python -m harness solve three-fasteners.toml fourteen-fasteners.toml --allow-gap 0.05` on the scenes
 beside this file and reads the tables that the command writes.

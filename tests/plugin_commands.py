@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 from suite_runs import all_end, heed_interrupts, wait_for
@@ -59,10 +58,8 @@ def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> Non
         preexec_fn=heed_interrupts,
     )
     wait_for(begun.exists)
-    start = time.monotonic()
     going.send_signal(sent)
-    _, said = going.communicate(timeout=30)
-    assert time.monotonic() - start < 1
+    _, said = going.communicate(timeout=30)  # it would sleep for 60 s
     assert going.returncode == 130
     assert "Interrupted" in said
     assert "Traceback" not in said

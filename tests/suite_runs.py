@@ -83,7 +83,7 @@ def processes(cache: Path) -> list[psutil.Process]:
 
 def all_end(cache: Path) -> bool:
     """Whether no process is left; the killed ones take a moment."""
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + 30
     while processes(cache) and time.monotonic() < deadline:
         time.sleep(0.05)
     return not processes(cache)

@@ -2,6 +2,8 @@
 
 import itertools
 import textwrap
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from report.results.answer_record import Answer, pair_name, stages, stress_map, von_mises
+from report.document.numbers import significant
+from report.results.answer_record import STRESS, Answer, pair_name, stages, stress_map, von_mises
 
 from . import style
 from .deformed_faces import deformed_figure
@@ -81,13 +84,16 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
 
 
 def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
-    """`history`, the largest gap and the forces over the stages, and `stage-gaps`, on one scale."""
-    table = stages(record, arrays)
-    history = style.figure(4.2)
-    gap, force = history.subplots(2, 1, sharex=True)
+    """`history`, the largest gap, the forces and the largest stress over the stages, and `stage-gaps`, on one
+    scale; outlined: larger than allowed.
+    """
+    table, allowed = stages(record, arrays), record.get("allowed_gap")
+    stressed = STRESS in table
+    history = style.figure(4.2 + 1.6 * stressed)
+    gap, force, *stress = history.subplots(2 + stressed, 1, sharex=True)
     gap.plot(table["stage"], table["largest_mm"], color=style.BLACK, marker="o")
-    ends = [*table["largest_mm"], (record.get("allowed_gap") or {}).get("allowed_mm", 0.0)]
-    if allowed := record.get("allowed_gap"):
+    ends = [*table["largest_mm"], (allowed or {}).get("allowed_mm", 0.0)]
+    if allowed:
         gap.axhline(allowed["allowed_mm"], color=LARGER, linestyle="--", label="limit")
         gap.legend()
     gap.set(ylabel="largest gap, mm", ylim=(min(0.0, *ends), 1.1 * max(ends) or None))
@@ -98,13 +104,25 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
     force.set(ylabel="sum of forces, N")
     force.set_xticks(range(len(table)), [textwrap.fill(name, 14) for name in table["stage"]])
     force.legend()
+    for axes in stress:
+        axes.plot(table["stage"], table[STRESS], color=style.BLACK, marker="o")
+        axes.set(ylabel=f"largest {STRESS}", ylim=(0.0, None))
     scale = rooted("gap, mm", "viridis", arrays["stage_gaps"])
-    maps = [
-        item
-        for stage, values in zip(record["stages"], arrays["stage_gaps"], strict=True)
-        for item in _pairs(stage["name"], (record | {"marks": stage["marks"]}, arrays), values, scale)
-    ]
+    maps = []
+    told = zip(table.to_dict("records"), record["stages"], arrays["stage_gaps"], strict=True)
+    for line, stage, values in told:
+        larger = [larger_than(allowed["allowed_mm"], values)] if allowed else []
+        answer = record | {"marks": stage["marks"]}, arrays
+        here = _pairs(stage["name"], answer, values, scale, larger)
+        maps += [replace(item, title=_outcome(line)) for item in here] if len(here) == 1 else here
     return {"history": history, "stage-gaps": drawn(maps, 2)[0]}
+
+
+def _outcome(stage: Mapping[Any, Any]) -> str:
+    """A line of the table of stages in words."""
+    words = f"{stage['stage']}: gap {significant(stage['largest_mm'])} mm"
+    words += f", stress {significant(stage[STRESS])} N/mm²" if STRESS in stage else ""
+    return words + (f", {stage['verdict']}" if "verdict" in stage else "")
 
 
 def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:

@@ -81,6 +81,7 @@ def fasteners(record: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=["kind", "contact", "x_mm", "y_mm", "force_N"])
 
 
+STRESS = "stress, N/mm²"
 ROUNDING = 1e-9  # of the largest force: a smaller one is rounding
 
 
@@ -102,7 +103,7 @@ def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
         least = ROUNDING * max(map(abs, forces.values()))
         forces = {name: force if abs(force) > least else 0.0 for name, force in forces.items()}
         if "largest_stress" in stage:
-            line["stress, N/mm²"] = stage["largest_stress"]
+            line[STRESS] = stage["largest_stress"]
         verdict = {"verdict": EXCEEDED[stage["exceeded"]]} if "exceeded" in stage else {}
         lines.append(line | {"closed": stage["closed"]} | forces | verdict)
     table = pd.DataFrame(lines)

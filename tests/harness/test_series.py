@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -143,10 +142,8 @@ def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:
     ],
 )
 def test_a_case_that_ends_the_process_leaves_those_before_it(fault: str, status: str, why: str) -> None:
-    """And costs those after it nothing: a solver out of time waits for one limit, not for theirs."""
-    start = time.monotonic()
+    """And costs those after it nothing: they are not run."""
     _, rows = made(FAULTY.replace("FAULT", fault), fault)
-    assert time.monotonic() - start < 15
     assert [row["status"] for row in rows] == ["solved", "solved", status, status]
     assert why in rows[2]["message"]
     assert "not run" in rows[3]["message"]

@@ -103,7 +103,7 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["check", "run"])
-def test_an_interrupt_ends_within_a_second(tmp_path: Path, what: str) -> None:
+def test_an_interrupt_ends_what_sleeps(tmp_path: Path, what: str) -> None:
     """While a solver sleeps in `check`, and while `run` waits for an import."""
     go = tmp_path / "begun"
     begin = f"open({str(go)!r}, 'w'); time.sleep(60)"
