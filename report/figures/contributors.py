@@ -37,11 +37,17 @@ def indices(series: Series, y: Array, error: float) -> pd.DataFrame:
 
 
 def of_contacts(series: Series) -> Array:
-    """(2, d, m): both indices of each of d inputs for the gap at each contact; 0 where it does not vary."""
-    error = series.cases["gap_error_mm"].max()
-    return np.concatenate(
-        [_estimated(_answers(series, gaps, error)) for gaps in series.of_contacts()], axis=2
-    )
+    """(2, d, m): both indices of each of d inputs for the gap at each contact; 0 where it does not vary, NaN
+    where a few cases make its variance v, so that v's own standard error is more than v / 3.
+    """
+    error, pieces = series.cases["gap_error_mm"].max(), []
+    for gaps in series.of_contacts():
+        f = _answers(series, gaps, error)
+        squares = (f - f.mean(axis=(0, 2), keepdims=True)) ** 2
+        error_of_v = squares.std(axis=(0, 2)) / np.sqrt(2 * f.shape[-1])  # A and B are independent
+        few = (squares.mean(axis=(0, 2)) <= 3.0 * error_of_v) & (error_of_v > 0.0)
+        pieces.append(np.where(few, np.nan, _estimated(f)))
+    return np.concatenate(pieces, axis=2)
 
 
 def of_forces(series: Series) -> tuple[pd.DataFrame, pd.DataFrame]:
