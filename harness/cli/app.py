@@ -31,7 +31,19 @@ app = typer.Typer(
 )
 
 
-def harness() -> None:
+def _show_version(asked: bool) -> None:
+    if asked:
+        from harness.results.provenance import provenance
+        from problems import __version__
+
+        typer.echo(f"rivetbench {__version__}, commit {provenance()['commit']}")
+        raise typer.Exit
+
+
+Version = typer.Option("--version", help="The version and the commit.", callback=_show_version, is_eager=True)
+
+
+def harness(version: Annotated[bool, Version] = False) -> None:
     """Compare quadratic-programming solvers on aircraft riveting problems.
 
     \b
