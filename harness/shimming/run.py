@@ -35,7 +35,7 @@ from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_inputs import RandomInputs
 from problems.model.effect import SpringEffect
 from problems.model.fastener_forces import fastener_forces
-from problems.model.positions import FORCES
+from problems.model.positions import Positions
 from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
@@ -249,7 +249,7 @@ def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):
         return [*faults, Fault(where, "assembly", "own matrices", "a joint: shims are between its parts")]
-    if not any(isinstance(e, SpringEffect) or any(hasattr(e, key) for key in FORCES) for e in scene.effects):
+    if not any(isinstance(effect, SpringEffect | Positions) for effect in scene.effects):
         faults.append(Fault(where, "effect", "no fasteners", "one that presses the parts together"))
     if not scene.joint.pairs:
         faults.append(Fault(where, "contacts", "none", "a contact that a shim can fill"))

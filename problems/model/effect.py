@@ -7,7 +7,7 @@ effect that acts on contacts and adds to the gap derives from two: `class Shims(
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -47,6 +47,14 @@ class Effect(Table):
     _lines: tuple[str, ...] = PrivateAttr(())
     #: The stage of each point in its file; empty if the file has no column `stage`.
     _stages: tuple[str, ...] = PrivateAttr(())
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Refuse a parameter that hides a method or property of a base class."""
+        for base in cls.__mro__[1:]:
+            if hidden := [name for name in cls.model_fields if name in vars(base)]:
+                taken = f"{base.__name__} has a method or property of this name"
+                raise TypeError(f"{cls.__name__}.{hidden[0]}: call the parameter otherwise: {taken}")
 
     def point_name(self, k: int) -> str:
         """The name of point k in messages: its line in the file, or points[k]."""

@@ -7,14 +7,14 @@ most e, the force is by at most k ‖t‖₁ e.
 
 from collections.abc import Iterator
 from itertools import product
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from problems.forms.assembly import Vector
 
 from .effect import SpringEffect
-from .positions import FORCES
+from .positions import FORCES, Positions
 from .scene import JointScene, Scene
 
 
@@ -23,11 +23,11 @@ def fastener_forces(scene: Scene, x: Vector) -> Iterator[dict[str, Any]]:
     if not isinstance(scene, JointScene):
         return
     for effect in scene.effects:
-        joint, fastener = scene.joint, cast(Any, effect)  # its kind is not imported, so that no other is
+        joint, preloads = scene.joint, [getattr(effect, key) for key in FORCES if hasattr(effect, key)]
         if isinstance(effect, SpringEffect):
             pairs, forces = effect.tied(joint), effect.tension(joint, x).tolist()
-        elif preloads := [getattr(effect, name) for name in FORCES if hasattr(effect, name)]:
-            pairs = fastener.pairs(joint)
+        elif preloads and isinstance(effect, Positions):
+            pairs = effect.pairs(joint)
             forces = np.resize(preloads, len(pairs) * effect.element_count(joint)).tolist()
         else:
             continue

@@ -31,10 +31,12 @@ class Column:
 
 
 def number(heading: str, name: str, style: Callable[[object], str] = significant) -> Column:
+    """Numbers of the data's column `name` in a style: three significant digits, or `whole` for counts."""
     return Column(heading, lambda row: style(row[name]))
 
 
 def word(heading: str, name: str) -> Column:
+    """Words of the data's column `name`."""
     return Column(heading, lambda row: str(row[name] or MISSING).replace("|", r"\|"), "left")
 
 

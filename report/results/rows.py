@@ -102,9 +102,7 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
 
 
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
-    """The labels (or method, or solvers) of some cells in the one order used everywhere: in the
-    order of OWNERS, then by name, and the forms of a solver in the order of FORMS.
-    """
+    """The values of a column (label, method, solver) in the order of all tables: owner, solver, form."""
     lines = cells.drop_duplicates(name)
     places = [
         (OWNERS.index(owner), solver, form_place(form), str(label))

@@ -15,6 +15,10 @@ from problems.effects.part_position import PartPosition
 from problems.effects.pressure import Pressure
 from problems.effects.rigid_tool import RigidTool
 from problems.effects.shims import Shims
+from problems.forms.assembly import Vector
+from problems.model.effect import ForceEffect, PartEffect, StiffnessEffect
+from problems.model.fastener_forces import fastener_forces
+from problems.model.interface import AnyJoint
 
 POINT = st.tuples(st.floats(0, 400), st.floats(0, 120))
 THREE = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, nodes=(9, 5))
@@ -212,3 +216,23 @@ def test_a_fastener_through_a_stack_presses_its_outer_parts_alone() -> None:
     assert f[:, 22].tolist() == [40.0, 0.0, -40.0]
     short = through.model_copy(update={"between": ("a", "b")}).force(THREE).reshape(3, 45)
     assert short[:, 22].tolist() == [40.0, -40.0, 0.0]
+
+
+def test_a_parameter_that_hides_a_method_is_refused_where_its_class_is_written() -> None:
+    with pytest.warns(UserWarning, match="shadows"), pytest.raises(TypeError, match=r"Pads\.stiffness: call"):
+
+        class Pads(StiffnessEffect):
+            stiffness: float  # type: ignore[assignment]
+
+
+def test_a_preload_elsewhere_than_at_points_is_no_fastener() -> None:
+    class Plungers(PartEffect, ForceEffect):
+        preload: float
+
+        def force(self, joint: AnyJoint) -> Vector:
+            return np.full(joint.size[0], self.preload)
+
+    press = Plungers(kind="plungers", part="a", preload=3.0)
+    fasteners = Fasteners(kind="fasteners", preload=(5.0, 7.0), points=((10.0, 10.0), (90.0, 10.0)))
+    entries = fastener_forces(make_scene(JOINT, press, fasteners), np.zeros(JOINT.size[0]))
+    assert [entry["force_N"] for entry in entries] == [5.0, 7.0]
