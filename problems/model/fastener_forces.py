@@ -27,7 +27,7 @@ def fastener_forces(scene: Scene, x: Vector) -> Iterator[dict[str, Any]]:
         if isinstance(effect, SpringEffect):
             pairs, forces = effect.tied(joint), effect.tension(joint, x).tolist()
         elif preloads and isinstance(effect, Positions):
-            pairs = effect.pairs(joint)
+            pairs = list(effect.pairs(joint))
             forces = np.resize(preloads, len(pairs) * effect.element_count(joint)).tolist()
         else:
             continue
