@@ -269,9 +269,13 @@ class SpringEffect(ForceEffect):
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
-        count = len(self.tied(joint)) * len(self.marks(joint))
+        count = self.spring_count(joint)
         if isinstance(self.approach, tuple) and len(self.approach) != count:
             yield "approach", list(self.approach), f"one number, or one for each of {count} springs"
+
+    def spring_count(self, joint: AnyJoint) -> int:
+        """r, the number of springs: one at each mark for each pair that they join."""
+        return len(self.tied(joint)) * len(self.marks(joint))
 
     def force(self, joint: AnyJoint) -> Vector:
         T, k = self.springs(joint)
@@ -281,6 +285,10 @@ class SpringEffect(ForceEffect):
         """(r,) the force of each spring at displacements x (n,) mm; N."""
         T, k = self.springs(joint)
         return k * (self.approach - T.T @ x) + np.resize(self.preload, len(k))
+
+    @abstractmethod
+    def marks(self, joint: AnyJoint) -> Matrix:
+        """(k, 2) mm, the points of the springs of each pair."""
 
     @abstractmethod
     def tied(self, joint: AnyJoint) -> list[Pair]:

@@ -84,7 +84,7 @@ def locked(scene: JointScene, approaches: Vector) -> JointScene:
     effects, start = list(scene.effects), 0
     for number, effect in enumerate(effects):
         if isinstance(effect, SpringEffect):
-            stop = start + len(effect.tied(scene.joint)) * effect.element_count(scene.joint)
+            stop = start + effect.spring_count(scene.joint)
             update = {"approach": tuple(approaches[start:stop].tolist())}
             effects[number], start = effect.model_copy(update=update), stop
     return replace(scene, effects=tuple(effects))
@@ -108,11 +108,12 @@ def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
 
 
 def _given(scene: JointScene, cases: int) -> dict[int, Matrix]:
-    """The approaches that the effects give, by the number of the effect: (pairs, elements, cases) mm."""
+    """The approaches that effects give, by the effect's number: (pairs, elements, springs, cases) mm."""
     approaches, joint = {}, scene.joint
     for number, effect in enumerate(scene.effects):
         if isinstance(effect, SpringEffect):
-            shape = len(effect.tied(joint)), effect.element_count(joint)
-            given = np.broadcast_to(np.array(effect.approach), shape[0] * shape[1])
-            approaches[number] = given.reshape(*shape, 1).repeat(cases, axis=2).astype(float)
+            count, elements = effect.spring_count(joint), max(effect.element_count(joint), 1)
+            shape = len(effect.tied(joint)), elements, len(effect.marks(joint)) // elements, 1
+            given = np.broadcast_to(np.array(effect.approach), count).reshape(shape)
+            approaches[number] = given.repeat(cases, axis=3).astype(float)
     return approaches

@@ -1,8 +1,9 @@
 """Stages against closed forms, against scenes made by hand, and against each other; and bad stages."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from superelements import stiffnesses, write_part
 
 from harness.scene.solution import Solution, solve
 from problems.build import load_case, prepared, shares_stiffness
+from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Matrix
 from problems.model.fastener_forces import fastener_forces
+from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene
 from problems.model.stage_answers import Elongations, locked, stage_scenes, through
 from problems.scene_files import read_scene, scene_of
@@ -144,6 +147,27 @@ def test_by_hand_and_stage_by_stage() -> None:
         alone = solve(stage.scene)
         assert abs(alone.x - stage.x).max() <= 1e-10
         assert alone.stages == ()
+
+
+class Layer(InstalledFasteners):
+    """Springs that stages set as a whole."""
+
+    def element_count(self, joint: AnyJoint) -> int:
+        return 0
+
+    def only(self, elements: Sequence[int], joint: AnyJoint) -> Self:
+        return self
+
+
+def test_springs_without_elements_lock_as_those_at_points() -> None:
+    scene = joined(ONCE)
+    effects = [
+        Layer(**effect.model_dump()) if isinstance(effect, InstalledFasteners) else effect
+        for effect in scene.effects
+    ]
+    for stages in (scene.stages, ()):
+        points = replace(scene, stages=stages)
+        np.testing.assert_array_equal(solve(replace(points, effects=tuple(effects))).x, solve(points).x)
 
 
 def test_each_part_is_in_equilibrium_in_each_stage() -> None:
