@@ -159,7 +159,8 @@ def run_series(
     path = None
     if report and (written := series_file.read_facts(directory)):
         more: dict[str, Any] = {"inputs": fingerprints(inputs)}
-        more |= {"derivatives": derivatives(job)} if cases.contributors and code == DONE else {}
+        whole = cases.contributors and code == DONE and not read.stages
+        more |= {"derivatives": derivatives(job)} if whole else {}
         series_file.write_fact(directory, "series", to_line(written | more))
         from report.writers.series_report import write  # slow to import: not before the first row
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -111,8 +112,9 @@ def movable_fasteners(scene: Scene) -> list[Fasteners]:
 
 def without_fasteners(scene: JointScene) -> JointScene:
     """The scene without the fasteners that can move."""
-    others = tuple(effect for effect in scene.effects if not isinstance(effect, Fasteners))
-    return replace(scene, effects=others)
+    others = [not isinstance(effect, Fasteners) for effect in scene.effects]
+    effects, origin = compress(scene.effects, others), compress(scene.numbers, others)
+    return replace(scene, effects=tuple(effects), origin=tuple(origin))
 
 
 def _twice(points: Matrix, source: str) -> list[Fault]:

@@ -152,8 +152,7 @@ def place(
     (newton,) = described([("newton", {})], None, "--solver", reporter)
     number = 1 if single else cases.count or RANDOM
     form = chosen_form(movable.scene, newton.forms, None, number * len(holes)).form
-    within = movable.scene if movable.scene.stages else movable.bare
-    study = FastenerStudy(movable.bare, cases.of_search(within, form), form, movable)
+    study = FastenerStudy(movable.bare, cases.of_search(movable.scene, form), form, movable)
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
     goal = Goal(allow_gap_mm, Goal.share_of(share, study.cases.count), count)

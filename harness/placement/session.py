@@ -34,7 +34,6 @@ from problems.effects.fasteners import Fasteners
 from problems.forms import Form
 from problems.forms.assembly import DualLoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
-from problems.load_cases.random_inputs import RandomInputs
 from problems.model.effect import Effect
 from problems.model.scene import JointScene
 from problems.model.stage_answers import Elongations, locked, through
@@ -211,7 +210,8 @@ class CaseAnswer:
     def scene(self) -> JointScene:
         """What acts in this case but the items, without stages."""
         study = self.session.study
-        return study.cases.scene_of(self.number) or locked(study.bare, self.approaches)
+        part = locked(study.bare, self.approaches)
+        return study.cases.scene_of(self.number, part) or part
 
 
 class PlanSession:
@@ -221,7 +221,7 @@ class PlanSession:
         threadpoolctl.threadpool_limits(THREADS)
         self.study = study
         self.stages = OpenStages(study.bare, study.form, partial(StiffnessSession, study))
-        self.last, self.f = self.stages.of(study.bare).session, load_case(study.bare, study.form).f
+        self.last, self.scene = self.stages.of(study.bare).session, study.cases.staged(study.scene)
         self.loads: dict[tuple[OpenStage[StiffnessSession], int], DualLoadCase] = {}
         self.starts = lru_cache(4)(lambda plan, numbers: self.answers([plan], numbers, ESTIMATE_MM))
         self.block = min(BLOCK, max(BLOCK_BYTES // (8 * self.last.data.assembly.n), 1))
@@ -291,7 +291,7 @@ class PlanSession:
             made.append(StageAnswers(session, loads, approaches, tolerance, near))
             return made[-1].elongations, None
 
-        for _ in through(self.study.scene, solve, len(plans) * len(numbers)):
+        for _ in through(self.scene, solve, len(plans) * len(numbers)):
             pass
         return made
 
@@ -300,13 +300,10 @@ class PlanSession:
     ) -> tuple[StiffnessSession, list[DualLoadCase]]:
         """The load cases in a stage, a scene whose springs have approaches (r, k) mm, and the session."""
         bares, items = zip(*(self.study.bare_stage(part, plan) for plan in plans), strict=True)
-        stage, cases = self.stages.of(bares[0]), self.study.cases
+        stage = self.stages.of(bares[0])
         session, K = stage.session, stage.session.data.assembly
         if new := [k for k in numbers if (stage, k) not in self.loads]:
-            random = new if isinstance(cases, RandomInputs) else ()
-            of_stage = StageCases(
-                cases, stage.f, stage.gap_change, {k: cases.load(k).f - self.f for k in random}
-            )
+            of_stage = StageCases(self.study.cases, stage)
             made = session.data.with_p([of_stage.load(k) for k in new])
             self.loads |= {(stage, k): load for k, load in zip(new, made, strict=True)}
         locking, overlap = stage.locking(K, approaches), np.zeros((K.m, approaches.shape[1]))

@@ -18,7 +18,7 @@ from problems.load_cases.random_inputs import random_inputs
 from problems.load_cases.scan_modes import VARIANCE, scan_modes
 from problems.model.scene import JointScene, Scene
 
-from .staged import last_scene
+from .staged import last_scene, refuse_staged_gaps
 
 RANDOM = 100  # cases, if no number is given
 
@@ -122,22 +122,20 @@ class GapCases:
         """The load cases of a scene, of one with stages those of the last. stiffness : whether keys may
         change K.
 
-        Raises InputError, as `measured_gaps` and `random_gaps` do; or if random keys would go through stages.
+        Raises InputError, as `measured_gaps` and `random_gaps` do; or if gaps are drawn that a stage sets.
         """
-        if (random := self.laws(scene)) and scene.stages:
-            allowed = f"left out: {scene.name} has stages"
-            raise InputError([Fault("--random", "key", text, allowed) for text in random])
-        scene = last_scene(scene)
-        if self.gaps:
-            return measured_gaps(scene, self.gaps, self.count, form, self.options)
-        if self.scans:
-            draw = self.count or RANDOM, self.seed or 0, self.variance or VARIANCE
-            return scan_modes(scene, self.scans, *draw, form, self.options)
-        law, gaps = (self.mean, self.sd, self.correlation_length), None
+        random, last, law = self.laws(scene), last_scene(scene), (self.mean, self.sd, self.correlation_length)
         count, seed = self.count or RANDOM, self.seed or 0
         fields = scene.effects_of(InitialGap) if isinstance(scene, JointScene) else ()
-        if not random or self.around or law != (None, None, None) or any(one.random for one in fields):
-            gaps = random_gaps(scene, count, seed, *law, form, self.around, self.options)
+        drawn = not random or self.around or law != (None, None, None) or any(one.random for one in fields)
+        if drawn:
+            refuse_staged_gaps(scene)
+        if self.gaps:
+            return measured_gaps(last, self.gaps, self.count, form, self.options)
+        if self.scans:
+            draw = count, seed, self.variance or VARIANCE
+            return scan_modes(last, self.scans, *draw, form, self.options)
+        gaps = random_gaps(last, count, seed, *law, form, self.around, self.options) if drawn else None
         if gaps and not random:
             return gaps
         return random_inputs(scene, random, form, gaps, count, seed, self.contributors, stiffness)

@@ -2,12 +2,14 @@
 
 The cases are those of the last stage, and differ in their gaps. In stage s case k has the gaps g_k + g_s − g
 and the forces f_s + T(k a_k), with g of the last stage, f_s without approaches, and a_k what the fasteners of
-s have locked in this case. Stages with the same K share its factors and the state of the solver.
+s have locked in this case. If effects are random, the cases say what acts in s. Stages with the same K share
+its factors and the state of the solver.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -29,40 +31,50 @@ RANDOM = ("initial_gap", "measured_gap")  # what the cases of a series replace
 
 
 def last_scene(scene: Scene) -> Scene:
-    """The scene that the load cases of a series are made of: of one with stages, what acts in the last.
+    """What acts in the last stage of a scene, or the scene if it has no stages."""
+    return [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
 
-    Raises InputError if the gap that they replace is not there in all stages.
-    """
-    if not (isinstance(scene, JointScene) and scene.stages):
-        return scene
-    *_, last = scenes = list(stage_scenes(scene).values())
+
+def refuse_staged_gaps(scene: Scene) -> None:
+    """Raises InputError if a gap that the cases of a series replace is not there in all stages."""
+    if not isinstance(scene, JointScene):
+        return
+    scenes = list(stage_scenes(scene).values())
     for effect in scene.effects_of(GapEffect):
         if effect.kind in RANDOM and any(effect not in part.effects for part in scenes):
             raise InputError.one(scene.name, "stage", effect.name, f"no {effect.kind}: a series replaces it")
-    return last
 
 
 @dataclass(frozen=True)
 class StageCases(LoadCases):
     """The load cases of one stage.
 
-    of_last : those of the last stage. f : of this stage, without approaches, (n,) N. gap_change : from the
-    last stage to this one, (m,) mm. locking : the forces of the locked approaches, (n,) N by the number of
-    the case; none without installed fasteners.
+    of_last : those of the last stage. stage : this one. locking : the locked approaches, (r,) mm, and their
+    forces, (n,) N, by the number of the case; none without installed fasteners.
     """
 
     of_last: LoadCases
-    f: Vector
-    gap_change: Vector
-    locking: dict[int, Vector]
+    stage: "OpenStage[Any]"
+    locking: dict[int, tuple[Vector, Vector]] = field(default_factory=dict)
 
     @property
     def key(self) -> str:
         return self.of_last.key
 
+    @cached_property
+    def drawn(self) -> LoadCases | None:
+        return self.of_last.of_stage(self.stage.scene)
+
     def load(self, k: int) -> LoadCase:
-        f = self.f + self.locking[k] if self.locking else self.f
-        return LoadCase(f, self.of_last.load(k).g + self.gap_change)
+        if self.drawn:
+            load = self.drawn.load(k)
+        else:
+            load = LoadCase(self.stage.f, self.of_last.load(k).g + self.stage.gap_change)
+        return LoadCase(load.f + self.locking[k][1], load.g) if self.locking else load
+
+    def scene_of(self, k: int, stage: JointScene | None = None) -> JointScene | None:
+        part = self.stage.scene
+        return self.of_last.scene_of(k, locked(part, self.locking[k][0]) if self.locking else part)
 
     def parameters(self, k: int) -> dict[str, float | str]:
         return self.of_last.parameters(k)
@@ -70,7 +82,7 @@ class StageCases(LoadCases):
 
 @dataclass(frozen=True, eq=False)
 class OpenStage(Generic[S]):
-    """What the load cases of a stage share: its scene, the session of its K, f without approaches (n,) N, the
+    """What the load cases of a stage share: its scene without approaches, the session of its K, f (n,) N, the
     change of the gap from the last stage (m,) mm, and its springs.
     """
 
@@ -93,15 +105,16 @@ class OpenStages(Generic[S]):
 
     def __init__(self, last: JointScene, form: Form, make: Callable[[JointScene], S]) -> None:
         self.form, self.make, self.gap = form, make, load_case(last, form).g
-        self.stages: dict[str, OpenStage[S]] = {}
+        self.stages: dict[tuple[object, ...], OpenStage[S]] = {}
 
     def of(self, part: JointScene) -> OpenStage[S]:
         """The stage in which `part` acts, a scene without stages."""
-        if (key := part.key) not in self.stages:
-            shared = (one.session for one in self.stages.values() if shares_stiffness(part, one.scene))
-            session, springs = next(shared, None) or self.make(part), Springs.of(part)
-            load = load_case(part, self.form, locked(part, np.zeros(len(springs.k))).effects)
-            self.stages[key] = OpenStage(part, session, load.f, load.g - self.gap, springs)
+        if (key := (part.key, part.origin)) not in self.stages:
+            springs = Springs.of(part)
+            bare = locked(part, np.zeros(len(springs.k)))
+            shared = (one.session for one in self.stages.values() if shares_stiffness(bare, one.scene))
+            session, load = next(shared, None) or self.make(bare), load_case(bare, self.form)
+            self.stages[key] = OpenStage(bare, session, load.f, load.g - self.gap, springs)
         return self.stages[key]
 
 
@@ -109,10 +122,10 @@ class StagedSession:
     """A job in this process, as `SeriesSession`, whose scene has stages."""
 
     def __init__(self, job: Job) -> None:
-        last = last_scene(job.scene)
         assert isinstance(job.scene, JointScene)
+        self.job, self.scene = job, job.cases.staged(job.scene)
+        last = last_scene(self.scene)
         assert isinstance(last, JointScene)
-        self.job, self.scene = job, job.scene
         self.stages = OpenStages(last, job.form, lambda part: SeriesSession(replace(job, scene=part)))
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
@@ -137,12 +150,11 @@ class StagedSession:
     def _session(self, part: JointScene, approaches: Matrix, block: Sequence[int]) -> SeriesSession:
         """The session of K of a stage, with the load cases of the stage."""
         stage = self.stages.of(part)
-        session, forces = stage.session, dict[int, Vector]()
+        session, locking = stage.session, dict[int, tuple[Vector, Vector]]()
         if stage.springs:
-            locking = stage.locking(session.data.assembly, approaches)
-            forces = dict(zip(block, np.ascontiguousarray(locking.T), strict=True))
-        cases = StageCases(self.job.cases, stage.f, stage.gap_change, forces)
-        session.job = replace(self.job, scene=part, cases=cases)
+            forces = np.ascontiguousarray(stage.locking(session.data.assembly, approaches).T)
+            locking = dict(zip(block, zip(approaches.T, forces, strict=True), strict=True))
+        session.job = replace(self.job, scene=part, cases=StageCases(self.job.cases, stage, locking))
         return session
 
     @staticmethod

@@ -32,8 +32,16 @@ class LoadCases(ABC):
         """The data of these cases alone, for a worker; the cases keep their numbers."""
         return self
 
-    def scene_of(self, k: int) -> JointScene | None:
-        """The scene with the fasteners of case k, where their forces are to be recorded."""
+    def scene_of(self, k: int, stage: JointScene | None = None) -> JointScene | None:
+        """The scene with the fasteners of case k, where their forces are recorded. stage : what acts."""
+        return None
+
+    def staged(self, scene: JointScene) -> JointScene:
+        """The scene whose stages the cases go through."""
+        return scene
+
+    def of_stage(self, stage: JointScene) -> "LoadCases | None":
+        """The load cases of what acts in a stage; None if stages change f and g by the same in all cases."""
         return None
 
     def stiffness_of(self, k: int) -> tuple[float, ...]:

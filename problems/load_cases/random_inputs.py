@@ -20,7 +20,10 @@ from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
+from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, Scene
+from problems.model.stage_answers import stage_scenes
+from problems.model.stages import Plan
 from problems.storage import digest
 
 from . import LoadCases
@@ -29,6 +32,7 @@ from .random_gaps import RandomGaps
 from .sweep import Key, allowed_keys, keys_of
 
 LAW = re.compile(r"(?:(each) |(\d+) of )?(.*)", re.DOTALL)
+LOCKED = "left out: the stage that sets it locks the approach that it has reached"
 FEW = "N of DISTRIBUTION: it changes K, and a K is kept for each of N values"
 
 
@@ -49,6 +53,15 @@ class Input(Key):
         few = (np.minimum(np.floor(self.levels * shares), self.levels - 1) + 0.5) / max(self.levels, 1)
         return values_at(self.law, few if self.levels else shares)
 
+    def is_column(self, effect: Any) -> bool:
+        """Whether the effect takes a number for each of its elements."""
+        return self.path[0] in effect.more_columns
+
+    def number(self, v: Vector, elements: Sequence[int], effect: Any) -> Any:
+        """The number drawn for what acts of an effect, one for each of its elements if it takes these."""
+        own = np.resize(v, max(self.elements, 1))[elements if self.elements else [0]]
+        return tuple(own.tolist()) if self.elements and self.is_column(effect) else own[0]
+
     def draw(self, seed: int, n: int) -> Vector:
         random = np.random.default_rng((seed, n, int(digest(self.name)[:16], 16)))
         return self.at(random.random(max(self.elements, 1)))
@@ -56,7 +69,9 @@ class Input(Key):
 
 @dataclass(frozen=True)
 class RandomInputs(LoadCases):
-    """The load cases of random inputs. gaps : of the field, if it is an input. contributors : see above."""
+    """The load cases of random inputs. gaps : of the field, if it is an input. contributors : see above.
+    stage : what acts; by default in the last stage, or in a scene without stages.
+    """
 
     scene: JointScene
     inputs: tuple[Input, ...]
@@ -66,6 +81,7 @@ class RandomInputs(LoadCases):
     form: Form
     contributors: bool
     notes: tuple[str, ...] = ()
+    stage: JointScene | None = None
 
     @property
     def key(self) -> str:
@@ -108,35 +124,69 @@ class RandomInputs(LoadCases):
                 effects[one.effect] = one.changed(effects[one.effect], float(v[0]), self.scene.joint)
         return replace(self, scene=replace(self.scene, effects=tuple(effects)))
 
+    def staged(self, scene: JointScene) -> JointScene:
+        """No spring has a random approach, which the loads have; those with a random preload have one."""
+        effects = list(scene.effects)
+        for one in self.inputs:
+            if isinstance(effects[one.effect], SpringEffect) and not one.changes_K:
+                preload = float(one.path == ("preload",))
+                effects[one.effect] = one.changed(effects[one.effect], preload, scene.joint)
+        return replace(scene, effects=tuple(effects))
+
+    def of_stage(self, stage: JointScene) -> "RandomInputs":
+        return replace(self, stage=stage)
+
     @cached_property
-    def pieces(self) -> dict[int, list[Any]]:
-        """The effects that change, by their numbers in the scene; the elements of one that has `each`."""
-        inputs = sorted((one for one in self.inputs if not one.changes_K), key=lambda one: one.elements)
-        effects, joint, each = self.scene.effects, self.scene.joint, {}
-        for i, count in {one.effect: one.elements for one in inputs}.items():
-            field = self.gaps.field if self.gaps and isinstance(effects[i], InitialGap) else effects[i]
-            each[i] = [field.only([k], joint) for k in range(count)] or [field]
-        return each
+    def part(self) -> JointScene:
+        """What acts, a scene without stages."""
+        return self.stage or [*stage_scenes(self.scene).values()][-1]
+
+    @cached_property
+    def acting(self) -> dict[int, tuple[Any, Sequence[int]]]:
+        """The effects that act, by their numbers in the scene, and the numbers of their elements there."""
+        pairs = zip(self.part.numbers, self.part.effects, strict=True)
+        return {number: (effect, elements) for (number, elements), effect in pairs}
+
+    @cached_property
+    def pieces(self) -> dict[int, list[tuple[list[int], Any]]]:
+        """What acts of each effect that changes, by its number in the scene, with the numbers of its elements
+        there; they are one by one where `each` is for a key that is no column.
+        """
+        pieces = {}
+        for i, (effect, elements) in self.acting.items():
+            keys = [one for one in self.inputs if one.effect == i and not one.changes_K]
+            field = self.gaps.field if self.gaps and isinstance(effect, InitialGap) else effect
+            if any(one.elements and not one.is_column(field) for one in keys):
+                own = enumerate(elements)
+                pieces[i] = [([k], field.only([place], self.part.joint)) for place, k in own]
+            elif keys:
+                pieces[i] = [([*elements], field)]
+        return pieces
+
+    @cached_property
+    def fixed(self) -> list[Any]:
+        """The other acting effects."""
+        return [effect for i, (effect, _) in self.acting.items() if i not in self.pieces]
 
     @cached_property
     def rest(self) -> LoadCase:
         """f and g of the other effects."""
-        others = (effect for i, effect in enumerate(self.scene.effects) if i not in self.pieces)
-        fixed = [effect for effect in others if not (self.gaps and isinstance(effect, InitialGap))]
-        return load_case(self.scene, self.form, fixed)
+        fixed = [effect for effect in self.fixed if not (self.gaps and isinstance(effect, InitialGap))]
+        return load_case(self.part, self.form, fixed)
 
     def changed(self, values: Iterable[Vector]) -> list[Any]:
         """The effects that change f or g, with these numbers of each of `inputs`."""
-        pieces = dict(self.pieces)
+        pieces, joint = dict(self.pieces), self.part.joint
         for one, v in zip(self.inputs, values, strict=True):
-            if not one.changes_K:
-                pairs = zip(pieces[one.effect], np.resize(v, len(pieces[one.effect])), strict=True)
-                pieces[one.effect] = [one.changed(*pair, self.scene.joint) for pair in pairs]
-        return [effect for some in pieces.values() for effect in some]
+            if one.effect in pieces and not one.changes_K:
+                own = pieces[one.effect]
+                pieces[one.effect] = [(k, one.changed(e, one.number(v, k, e), joint)) for k, e in own]
+        return [effect for some in pieces.values() for _, effect in some]
 
-    def scene_of(self, k: int) -> JointScene:
-        fixed = (effect for i, effect in enumerate(self.scene.effects) if i not in self.pieces)
-        return replace(self.scene, effects=(*fixed, *self.changed(self.values(k))))
+    def scene_of(self, k: int, stage: JointScene | None = None) -> JointScene:
+        cases = self.of_stage(stage) if stage else self
+        effects = (*cases.fixed, *cases.changed(self.values(k)))
+        return replace(cases.part, effects=effects, origin=())
 
     def load(self, k: int) -> LoadCase:
         return self.load_at(self.values(k), self.draws(k)[-1])
@@ -145,7 +195,7 @@ class RandomInputs(LoadCases):
         """The load of these numbers of each of `inputs`. field : the draw of the random gap, or its mean."""
         effects = self.changed(values)
         laws = [effect for effect in effects if self.gaps and isinstance(effect, InitialGap)]
-        change = load_case(self.scene, self.form, [effect for effect in effects if effect not in laws])
+        change = load_case(self.part, self.form, [effect for effect in effects if effect not in laws])
         g = self.rest.g + change.g
         if self.gaps:
             g += self.gaps.gap(field, *(laws or [self.gaps.field]))
@@ -170,6 +220,8 @@ def random_inputs(
     if not isinstance(scene, JointScene):
         raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}))
     keys, loads, faults, inputs = keys_of(scene, stiffness), keys_of(scene), list[Fault](), list[Input]()
+    steps = Plan(scene.effects, scene.stages, scene.joint).steps
+    fresh = {number for step in steps for number, _ in step.fresh}
     if gaps and gaps.points is not None:  # a scan has one correlation length
         keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}
     for name, text in [[part.strip() for part in law.partition("=")[::2]] for law in laws]:
@@ -189,6 +241,8 @@ def random_inputs(
             inputs.append(one := Input(key.name, key.effect, key.path, *how))
             if each and not elements:
                 faults.append(Fault(where, "each", text, "left out: it has no elements at points"))
+            if key.path == ("approach",) and key.effect in fresh:
+                faults.append(Fault(where, "key", name, LOCKED))
             if one.changes_K and not one.levels:
                 faults.append(Fault(where, "distribution", text, FEW))
             for value in one.at(np.array([0.0, 1.0])).tolist():

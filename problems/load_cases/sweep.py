@@ -39,16 +39,16 @@ class Key:
     path: tuple[str, ...]
 
     def changed(self, effect: Any, value: float, joint: AnyJoint) -> Any:
-        """The effect with this number changed, validated as on reading."""
+        """The effect with this number changed, validated as on reading; stages set the same points."""
         table = inner = effect.model_dump()
         if self.path[0] == "points":
             shift = [value * (self.path[1] == axis) for axis in "xy"]
             table |= {"points": (effect.marks(joint) + shift).tolist(), "pattern": None}
-            return type(effect).model_validate(table)
-        for key in self.path[:-1]:
-            inner = inner[key]
-        inner[self.path[-1]] = value
-        return type(effect).model_validate(table)
+        else:
+            for key in self.path[:-1]:
+                inner = inner[key]
+            inner[self.path[-1]] = value
+        return effect.model_copy(update=dict(type(effect).model_validate(table)))
 
     def faults(self, scene: JointScene, value: float, where: str) -> list[Fault]:
         """The faults of this value."""

@@ -85,6 +85,9 @@ class Positions(ContactEffect, ForceEffect):
         update: dict[str, object] = {"points": places, "pattern": None}
         if isinstance(preload := getattr(self, "preload", None), tuple):
             update["preload"] = tuple(preload[k] for k in elements)
+        if isinstance(approach := getattr(self, "approach", None), tuple):
+            of_pairs = np.reshape(approach, (-1, self.element_count(joint)))
+            update["approach"] = tuple(of_pairs[:, elements].ravel().tolist())
         return self.model_copy(update=update)
 
     def unusual(self, joint: AnyJoint) -> Faults:

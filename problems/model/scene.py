@@ -110,6 +110,7 @@ class JointScene(Scene):
     """A joint and the effects that the scene includes.
 
     random : the table [random], each entry as KEY=DISTRIBUTION, in no key; `GapCases` draws them.
+    origin : of each effect of a stage its number in the scene, and its elements that act; else ().
     model : see `problems.build.model_of`; neither copied nor sent to a worker.
     """
 
@@ -118,10 +119,17 @@ class JointScene(Scene):
     stages: tuple[Stage, ...] = ()
     output: Output = GAPS_ALONE
     random: tuple[str, ...] = ()
+    origin: tuple[tuple[int, tuple[int, ...]], ...] = ()
     model: Any = field(default=None, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"model": None}
+
+    @property
+    def numbers(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
+        """`origin`, or that of a stage in which everything acts."""
+        counts = enumerate(effect.element_count(self.joint) for effect in self.effects)
+        return self.origin or tuple((i, tuple(range(count))) for i, count in counts)
 
     def effects_of(self, kind: type[E]) -> Iterator[E]:
         """The effects of one class, in the scene's order."""

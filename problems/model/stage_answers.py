@@ -102,9 +102,10 @@ def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
 
 
 def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
-    effects = tuple(acting_effects(scene.effects, elements, scene.joint).values())
+    acting = acting_effects(scene.effects, elements, scene.joint)
+    origin = tuple((number, tuple(of_effect(number, elements))) for number in acting)
     title = f"{scene.title}: {step.name}" if step.name else scene.title
-    return replace(scene, title=title, effects=effects, stages=())
+    return replace(scene, title=title, effects=tuple(acting.values()), stages=(), origin=origin)
 
 
 def _given(scene: JointScene, cases: int) -> dict[int, Matrix]:

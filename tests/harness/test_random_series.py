@@ -89,14 +89,6 @@ def test_bad_random_keys_are_refused(
     assert not (tmp_path / "out").exists()
 
 
-def test_random_keys_do_not_go_through_stages(scene: Path, tmp_path: Path) -> None:
-    text = scene.read_text().replace('kind = "pressure"', 'kind = "pressure"\nname = "air"')
-    scene.write_text(f'{text}\n[[stage]]\nname = "one"\non = ["air"]\n')
-    done = harness("series", scene, "--out", tmp_path / "out")
-    assert done.exit_code == 2
-    assert "has stages" in done.output
-
-
 @pytest.mark.usefixtures("without_pictures")
 def test_a_sweep_leaves_the_table_out(scene: Path, tmp_path: Path) -> None:
     done = harness("series", scene, "--sweep", "initial_gap.mean=0.2,0.4", "--out", tmp_path / "out")
@@ -149,7 +141,7 @@ def test_searches_draw_what_a_series_draws(scene: Path, tmp_path: Path) -> None:
     assert [figures[-2] for figures in outcome.further] == pytest.approx(forces)
     pressed = replace(read, random=("pressure.value=uniform(0, 2e-4)",))
     movable = MovableFasteners.of(pressed)
-    cases = GapCases(count=3).of_search(movable.bare, "dual")
+    cases = GapCases(count=3).of_search(movable.scene, "dual")
     (placed,) = PlanSession(FastenerStudy(movable.bare, cases, "dual", movable)).answer(
         Question((movable.current,), (0, 1, 2))
     )

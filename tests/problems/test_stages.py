@@ -3,14 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import pytest
+from riveted_strips import FORCE, STIFFNESS, C, Tables, approach, joint_scene, strips
 from small_joints import untied
 from superelements import stiffnesses, write_part
 
-from harness.scene.solution import Solution, solve
+from harness.scene.solution import solve
 from problems.build import load_case, prepared, shares_stiffness
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
@@ -20,45 +21,7 @@ from problems.model.fastener_forces import fastener_forces
 from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene
 from problems.model.stage_answers import Elongations, locked, stage_scenes, through
-from problems.scene_files import read_scene, scene_of
-
-Tables = dict[str, Any]
-LENGTH, THICKNESS, WIDTH, YOUNG = 200.0, 4.0, 10.0, 70e3
-#: Relative deflection of the middles of two built-in strips per force between them, mm/N.
-C = 2 * LENGTH**3 / (192 * YOUNG * WIDTH * THICKNESS**3 / 12)
-FORCE, STIFFNESS = 30.0, 900.0
-
-
-def strips(**rivets: Any) -> JointScene:
-    """Two strips built in at both ends, pressed together at the middle, and riveted where they are."""
-    ends = {"length": (LENGTH - 20) / 2, "elements": 3}
-    strip = {"thickness": THICKNESS, "young": YOUNG, "poisson": 0.0, "clamped": ["south", "north"]}
-    parts = [strip | {"name": name, "south": ends, "north": ends} for name in "ab"]
-    junction = {"length": WIDTH, "width": 20.0, "nodes": [2, 3]}
-    forces = {"points": [[0.0, 10.0], [WIDTH, 10.0]], "preload": FORCE / 2}
-    rivet = {"points": forces["points"], "stiffness": STIFFNESS / 2}
-    effects = [
-        {"kind": "initial_gap", "mean": 50.0},
-        {"kind": "fasteners", "name": "tacks"} | forces,
-        {"kind": "installed_fasteners", "name": "rivets"} | rivet | rivets,
-    ]
-    stages = [
-        {"name": "tack", "on": ["tacks"]},
-        {"name": "rivet", "on": ["rivets"]},
-        {"name": "release", "off": ["tacks"]},
-    ]
-    return joint_scene({"joint": {"junction": junction, "part": parts}, "effect": effects, "stage": stages})
-
-
-def joint_scene(table: Tables) -> JointScene:
-    scene = scene_of(table)
-    assert isinstance(scene, JointScene)
-    return scene
-
-
-def approach(answer: Solution, stage: int) -> float:
-    """By how much the gaps at the middle of the strips have been closed, on average."""
-    return float((50.0 - answer.stages[stage].gap[2:4]).mean())
+from problems.scene_files import read_scene
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])

@@ -240,7 +240,8 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "harness/placement/session.py": {
         "gaps.max(axis=0) + errors)": ("gaps.max(axis=0) - errors)", "gaps.max(axis=0))"),
         "g + gap, u + change": ("g + gap, u",),
-        "cases.load(k).f - self.f": ("0.0 * self.f",),
+        "study.cases.staged(study.scene)": ("study.scene",),
+        "locked(study.bare, self.approaches)": ("study.bare",),
         "self.last.data, np.zeros(": ("self.last.data, -1e-4 * np.ones(",),
         "(stage.springs.k[:, None] * approaches)": ("(0 * approaches)",),
         " - overlap.T @ self.vectors[0]": (" + overlap.T @ self.vectors[0]",),
@@ -303,6 +304,15 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "problems/load_cases/random_inputs.py": {
         "self.levels - 1) + 0.5)": ("self.levels - 1) + 0.4)",),
         "if one.changes_K:\n                effects": ("if False:\n                effects",),
+        'float(one.path == ("preload",))': ("0.0", "1.0"),
+        "[elements if self.elements else [0]]": ("[: len(elements) or 1]",),
+        "if i not in self.pieces": ("if True",),
+    },
+    "harness/series/staged.py": {
+        "load = self.drawn.load(k)": ("load = self.of_last.load(k)",),
+        "load.f + self.locking[k][1]": ("load.f",),
+        "locked(part, self.locking[k][0])": ("part",),
+        "job.cases.staged(job.scene)": ("job.scene",),
     },
     "problems/input/matrix_entries.py": {
         "SYMMETRY * sizes[i] * sizes[j]": ("SYMMETRY * sizes.max() ** 2",),
@@ -398,6 +408,7 @@ TESTS = {
         "harness/test_place.py",
         "harness/test_staged_place.py",
         "harness/test_random_series.py",
+        "harness/test_staged_random.py",
     ),
     "harness/placement/plan_search.py": ("harness/test_search.py", "harness/test_place.py"),
     "harness/shimming/search.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
@@ -408,7 +419,11 @@ TESTS = {
     "harness/placement/search.py": ("harness/test_search.py", "harness/test_place.py"),
     "harness/placement/fresh_cases.py": ("harness/test_place.py",),
     "harness/series/derivatives.py": ("harness/test_derivatives.py",),
-    "problems/load_cases/random_inputs.py": ("harness/test_random_series.py",),
+    "problems/load_cases/random_inputs.py": (
+        "harness/test_random_series.py",
+        "harness/test_staged_random.py",
+    ),
+    "harness/series/staged.py": ("harness/test_staged_series.py", "harness/test_staged_random.py"),
     "problems/input/matrix_entries.py": ("problems/test_entries.py", "problems/test_formats.py"),
     "solvers/algorithms/newton_sweeps.py": (
         "solvers/test_sweeps.py",
