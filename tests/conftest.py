@@ -1,6 +1,7 @@
 """What all tests share: a cache of their own, so that none reads or fills the user's; pictures of few pixels,
-drawn in a quarter of the time; quick tests first."""
+drawn in a quarter of the time; garbage that is looked for less often; quick tests first."""
 
+import gc
 import os
 import shutil
 from collections.abc import Iterator
@@ -12,6 +13,8 @@ from forked_processes import fork_measuring_processes
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 ON_WORKERS = ("harness.measurement.task", "harness.placement.session", "harness.series.executors")
+
+gc.set_threshold(20_000, 20, 100)  # by default a tenth of the time, with all that the tests import
 
 if DISTRIBUTED:  # a thread for each process; read when numpy is loaded
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

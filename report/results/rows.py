@@ -31,12 +31,13 @@ def frame(records: list[dict[str, Any]], by: Sequence[str] = ()) -> pd.DataFrame
     Flags are 1.0, 0.0 or missing. Adds `working_mib`, the memory that the solver needs on top of the data.
     """
     rows = pd.DataFrame(records)
+    columns: dict[str, Any] = dict(rows)
     for name in [*NUMBERS, *FLAGS]:
-        column = rows[name] if name in rows else pd.Series(np.nan, index=rows.index)
-        rows[name] = pd.to_numeric(column, errors="coerce").astype(float)
+        columns[name] = pd.to_numeric(rows[name], errors="coerce").astype(float) if name in rows else np.nan
     for name in TEXTS:
-        column = rows[name] if name in rows else pd.Series(None, index=rows.index, dtype=object)
-        rows[name] = column.map(lambda value: "" if pd.isna(value) else str(value))
+        values = rows.get(name, ())
+        columns[name] = ["" if pd.isna(value) else str(value) for value in values] or ""
+    rows = pd.DataFrame(columns, index=rows.index)
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
     rows = rows.drop_duplicates([*CELL, "repeat", "case", *by], keep="last")
