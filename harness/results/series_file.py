@@ -208,6 +208,7 @@ def refuse_damaged(directory: Path) -> None:
         (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
         short = connection.execute(WITHOUT_GAP, (m * GAP.itemsize,)).fetchone()
     if state != "ok" or short or facts is None:
-        raise InputError.one(path, "content", f"no gaps of case {short[0]}" if short else state, AGAIN)
+        content = f"no gaps of case {short[0]}, as in published series" if short else state
+        raise InputError.one(path, "content", content, AGAIN)
     for _ in rows(directory):
         pass
