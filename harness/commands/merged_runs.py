@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from harness.measurement.suite_run import record_machine
+from harness.planning.suite import read_written
 from harness.results import records
 from harness.results.comparison import Incomparable, read_side, refuse_incomparable
+from harness.results.row_validation import refuse_unreadable
 from harness.verification.reference_problem import PROBLEMS
 from problems.errors import InputError
 
@@ -22,6 +24,10 @@ def merge(names: Sequence[str], out: Path) -> Path:
     sides = [read_side(name) for name in names]
     for side in sides[1:]:
         refuse_incomparable(sides[0], side)
+    for folder in map(Path, names):  # before anything is written
+        refuse_unreadable(folder)
+        if (folder / SUITE).is_file():
+            read_written(folder / SUITE)
     rows = [row | dict.fromkeys(("answer", "log")) for side in sides for row in side.rows]
     ((place, count),) = Counter((row.get("key"), row.get("machine")) for row in rows).most_common(1)
     if count > 1:

@@ -22,7 +22,7 @@ def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goa
         **{name: f"{counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
         "scene_key": study.scene.key,
         "fastener": study.movable.fastener.model_dump(mode="json", include={"preload", "between"}),
-        "cases_key": study.cases.key,
+        "cases_key": study.cases.content_key,
         "cases": study.cases.count,
         "form": study.form,
         "rivetbench_version": installed_version("rivetbench"),

@@ -16,6 +16,7 @@ from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import about, expected_error
 from problems.build import prepared, shares_stiffness
+from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
@@ -62,6 +63,11 @@ def validate(scene: str | Path, *, reporter: Reporter = SILENT) -> Size | None:
         from .stress import refuse_unusable  # only what a scene calls for
 
         refuse_unusable(None, read)
+    if isinstance(read, JointScene) and read.random:
+        from problems.load_cases.random_inputs import inputs_of
+
+        if faults := inputs_of(read, read.random, stiffness=True)[1]:
+            raise InputError(faults)
     if isinstance(read, JointScene) and isinstance(read.joint, Joint):
         assert size is not None
         _plates(read, size, console)

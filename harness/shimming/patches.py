@@ -99,7 +99,9 @@ def made(
     """
     low, high = joint.bounds[0] - NEAR, joint.bounds[1] + NEAR
     faults = [Fault(source, at, outline, SHAPE) for _, outline, at in shapes if len(outline) < 3]
-    for _, outline, at in shapes:
+    for k, (name, outline, at) in enumerate(shapes):
+        if name in [other for other, *_ in shapes[:k]]:
+            faults.append(Fault(source, at, name, "a name of its own, its corners one after another"))
         off = [place for place in outline if (place < low).any() or (place > high).any()]
         faults += [Fault(source, at, place, on_junction(joint)) for place in off[:1]]
     patches, owner = [], np.full(joint.size[1], "", dtype=object)

@@ -204,7 +204,7 @@ def shim(
     identity = asked | {
         "patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}",
         "scene_key": read.key,
-        "cases_key": made.key,
+        "cases_key": made.content_key,
         "cases": made.count,
         "form": form,
         "rivetbench_version": installed_version("rivetbench"),

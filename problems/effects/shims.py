@@ -1,6 +1,6 @@
 """Shims: a sheet, even or tapered, fills the gap over a rectangle or a polygon."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -51,11 +51,20 @@ class Shims(ContactEffect, GapEffect):
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
+        if any(self._crossed()):
+            yield "outline", list(self.outline), "corners in their order around it: two of its edges cross"
         pairs = [pair for pair in self.pairs(joint) if pair in joint.pairs]
         places = np.concatenate([np.zeros((0, 2)), *map(joint.places, pairs)])
         if len(places) and not self._covered(places, joint).any():
             x, y = places[((places - self.ranges.mean(axis=1)) ** 2).sum(axis=1).argmin()]
             yield "x, y", self.ranges.tolist(), f"ranges with a node; the nearest: at {x:g}, {y:g} mm"
+
+    def _crossed(self) -> Iterator[bool]:
+        """Yield of each edge of the outline whether another one passes through it."""
+        start, stop = np.reshape(self.outline, (-1, 2)), np.roll(self.outline, -1, axis=0)
+        for a, b in zip(start, stop, strict=True):
+            side, (first, last) = cross(b - a, start - a), (cross(stop - start, p - start) for p in (a, b))
+            yield bool(((side * np.roll(side, -1) < 0) & (first * last < 0)).any())
 
     def _covered(self, places: Matrix, joint: AnyJoint) -> Mask:
         """(k,) which places are in the rectangle, or in the polygon: a ray from them to the right crosses its

@@ -39,7 +39,8 @@ FORCES = NO_UNIT | {"n": Fraction(1), "kn": Fraction(1000)}
 UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT) | {"preload": FORCES}
 WORDS = ("name", "stage", "side")  # headings of columns of words
 BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))
-HEADING = re.compile(rf"(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
+FORCE = r"(preload)[\s_/,:-]*(?:in\s+)?[\[({]?\s*(.*?)\s*[\])}]?"
+HEADING = re.compile(rf"{FORCE}|(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
 PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 APART = ".,' \u2019\u00a0\u2009\u202f"  # separators of thousands
 GROUPS = re.compile(rf"[+-]?[1-9]\d{{0,2}}([{APART}])\d{{3}}(?:\1\d{{3}})*(?:(?!\1)([.,])\d+)?", re.ASCII)
@@ -179,9 +180,10 @@ def _read(table: Cells, headings: Mapping[str, str], options: TableOptions, read
     there, listed = [heading(cell) for cell in table.header], ", ".join(headings.values())
     names = [name for name, _ in there]
     wanted = [heading(text)[0] for text in headings.values()]
-    if any(names.count(name) != 1 for name in wanted):
+    twice = [word for word in WORDS if names.count(word) > 1]
+    if twice or any(names.count(name) != 1 for name in wanted):
         line = table.start + (not table.header)
-        allowed = f"a header line with the columns {listed}, once each"
+        allowed = f"a header line with the columns {', '.join([listed, *twice])}, once each"
         raise InputError.one(table.path, f"line {line}", table.text[line - 1], allowed)
     columns = [names.index(name) for name in wanted]
     words = {word: names.index(word) for word in WORDS if word in names}
@@ -263,10 +265,11 @@ def doubt(texts: Iterable[str], mark: str) -> str:
 def heading(cell: str) -> tuple[str, str]:
     """The name and the unit of a heading, both in small letters; the unit may be empty."""
     text = _plain(cell)
-    if not (parts := HEADING.fullmatch(text)) or not parts[1]:
+    parts = HEADING.fullmatch(text)
+    if not parts or not (name := parts[1] or parts[3]):
         return text, ""
-    unit = parts[2] or parts[3] or ""
-    return (parts[1] if unit in LENGTHS or (parts[1] == "preload" and unit in FORCES) else text), unit
+    unit = parts[2] or parts[4] or parts[5] or ""
+    return (name if unit in LENGTHS or name in UNITS else text), unit
 
 
 def _plain(cell: str) -> str:

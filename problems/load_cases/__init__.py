@@ -24,6 +24,11 @@ class LoadCases(ABC):
     def key(self) -> str:
         """Hash of everything that determines the cases, except their count."""
 
+    @property
+    def content_key(self) -> str:
+        """Hash of the cases themselves: that of a table, which may grow in a series, has its rows."""
+        return self.key
+
     @abstractmethod
     def load(self, k: int) -> LoadCase:
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""

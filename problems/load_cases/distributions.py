@@ -24,6 +24,8 @@ def distribution(text: str) -> Any:
         name = {"normal": "norm"}.get(call.func.id, call.func.id)
         values = [float(ast.literal_eval(value)) for value in call.args]
         named = {str(one.arg): float(ast.literal_eval(one.value)) for one in call.keywords}
+        if len(named) < len(call.keywords):
+            raise ValueError("a parameter twice")
     except (SyntaxError, ValueError, TypeError, AttributeError, RecursionError, MemoryError) as error:
         raise ValueError(SYNTAX) from error
     known = {key: value for key, value in vars(stats).items() if isinstance(value, stats.rv_continuous)}
@@ -34,8 +36,9 @@ def distribution(text: str) -> Any:
         frozen = known[name](*values, **named)
         if not np.isfinite(values_at(frozen, np.array([0.0, 0.5, 1.0]))).all():
             raise TypeError(order)
-    except TypeError as error:
-        raise ValueError(f"{name}({order}), all finite, a scale above 0, shapes that it is for") from error
+    except Exception as error:  # scipy raises kinds of its own
+        allowed = "all finite, a scale above 0, shapes that it is for and has quantiles of"
+        raise ValueError(f"{name}({order}), {allowed}") from error
     return frozen
 
 

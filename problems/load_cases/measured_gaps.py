@@ -46,6 +46,10 @@ class MeasuredGaps(LoadCases):
         """
         return digest("table", self.gaps.shape[1])
 
+    @property
+    def content_key(self) -> str:
+        return digest("table", self.gaps.shape[1], np.ascontiguousarray(self.gaps[: self.count]).tobytes())
+
     def parameters(self, k: int) -> dict[str, float | str]:
         """The hash of the gaps of case k, which reveals a row that has changed since."""
         return {"gaps": digest(np.ascontiguousarray(self._row(k)).tobytes())}

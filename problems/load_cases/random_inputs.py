@@ -29,9 +29,9 @@ from problems.storage import digest
 from . import LoadCases
 from .distributions import distribution, values_at
 from .random_gaps import RandomGaps
-from .sweep import Key, allowed_keys, keys_of
+from .sweep import MOST_CASES, Key, allowed_keys, keys_of
 
-LAW = re.compile(r"(?:(each) |(\d+) of )?(.*)", re.DOTALL)
+LAW = re.compile(r"(?:(each) |([1-9]\d{0,6}) of )?(.*)", re.DOTALL)
 LOCKED = "left out: the stage that sets it locks the approach that it has reached"
 FEW = "N of DISTRIBUTION: it changes K, and a K is kept for each of N values"
 
@@ -202,6 +202,43 @@ class RandomInputs(LoadCases):
         return LoadCase(self.rest.f + change.f if change.f.any() else self.rest.f, g)
 
 
+def inputs_of(
+    scene: JointScene, laws: Sequence[str], stiffness: bool = False, scanned: bool = False
+) -> tuple[list[Input], list[Fault]]:
+    """The inputs of laws, and what is wrong with these. scanned : whether random gaps pass through a scan."""
+    keys, loads, faults, inputs = keys_of(scene, stiffness), keys_of(scene), list[Fault](), list[Input]()
+    steps = Plan(scene.effects, scene.stages, scene.joint).steps
+    fresh = {number for step in steps for number, _ in step.fresh}
+    if scanned:  # a scan has one correlation length
+        keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}
+    for law in laws:
+        name, text = (part.strip() for part in law.partition("=")[::2])
+        source = f"scene {scene.name}: [random]" if law in scene.random else "--random"
+        each, levels, bare = cast(re.Match[str], LAW.fullmatch(text)).groups()
+        key, where = keys.get(name), f"{source} {name}"
+        if key is None or name in [one.name for one in inputs]:
+            allowed = "one distribution of each key" if key else allowed_keys(keys)
+            faults.append(Fault(source, "key", name, allowed))
+        try:
+            frozen = distribution(bare)
+        except ValueError as error:
+            faults.append(Fault(where, "distribution", text, str(error)))
+            continue
+        if key:
+            elements = scene.effects[key.effect].element_count(scene.joint) if each else 0
+            how = text, frozen, elements, int(levels or 0), name not in loads
+            inputs.append(one := Input(key.name, key.effect, key.path, *how))
+            if each and not elements:
+                faults.append(Fault(where, "each", text, "left out: it has no elements at points"))
+            if key.path == ("approach",) and key.effect in fresh:
+                faults.append(Fault(where, "key", name, LOCKED))
+            if one.changes_K and not one.levels:
+                faults.append(Fault(where, "distribution", text, FEW))
+            for value in one.at(np.array([0.0, 1.0])).tolist():
+                faults += key.faults(scene, value, f"{where}={text}")
+    return inputs, faults
+
+
 def random_inputs(
     scene: Scene,
     laws: Sequence[str],
@@ -219,37 +256,12 @@ def random_inputs(
     """
     if not isinstance(scene, JointScene):
         raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}))
-    keys, loads, faults, inputs = keys_of(scene, stiffness), keys_of(scene), list[Fault](), list[Input]()
-    steps = Plan(scene.effects, scene.stages, scene.joint).steps
-    fresh = {number for step in steps for number, _ in step.fresh}
-    if gaps and gaps.points is not None:  # a scan has one correlation length
-        keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}
-    for name, text in [[part.strip() for part in law.partition("=")[::2]] for law in laws]:
-        each, levels, bare = cast(re.Match[str], LAW.fullmatch(text)).groups()
-        key, where = keys.get(name), f"--random {name}"
-        if key is None or name in [one.name for one in inputs]:
-            allowed = "one distribution of each key" if key else allowed_keys(keys)
-            faults.append(Fault("--random", "key", name, allowed))
-        try:
-            law = distribution(bare)
-        except ValueError as error:
-            faults.append(Fault(where, "distribution", text, str(error)))
-            continue
-        if key:
-            elements = scene.effects[key.effect].element_count(scene.joint) if each else 0
-            how = text, law, elements, int(levels or 0), name not in loads
-            inputs.append(one := Input(key.name, key.effect, key.path, *how))
-            if each and not elements:
-                faults.append(Fault(where, "each", text, "left out: it has no elements at points"))
-            if key.path == ("approach",) and key.effect in fresh:
-                faults.append(Fault(where, "key", name, LOCKED))
-            if one.changes_K and not one.levels:
-                faults.append(Fault(where, "distribution", text, FEW))
-            for value in one.at(np.array([0.0, 1.0])).tolist():
-                faults += key.faults(scene, value, f"{where}={text}")
+    scanned = gaps is not None and gaps.points is not None
+    inputs, faults = inputs_of(scene, laws, stiffness, scanned)
     d = len(inputs) + bool(gaps)
-    if N is not None and (d < 2 or N < 2 or N & (N - 1)):
-        faults.append(Fault("--contributors", "N, inputs", (N, d), "a power of 2, and two inputs or more"))
+    if N is not None and (d < 2 or N < 2 or N & (N - 1) or N * (d + 2) > MOST_CASES):
+        allowed = f"a power of 2, two inputs or more, N (inputs + 2) at most {MOST_CASES}"
+        faults.append(Fault("--contributors", "N, inputs", (N, d), allowed))
     if faults:
         raise InputError(faults)
     count, notes = (N * (d + 2) if N else count), (gaps.notes if gaps else ())

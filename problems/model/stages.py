@@ -23,7 +23,7 @@ from .joint import Faults, Joint, Table
 
 #: The motions that are left to a plate, by the number of those that its supports hold.
 LOOSE = ("it moves and tilts freely", "it tilts about a point", "it tilts about a line")
-SLICE = re.compile(r"(.+?)\s*\[\s*(\d*)\s*:\s*(\d*)\s*\]")
+SLICE = re.compile(r"(.+?)\s*\[\s*(\d{0,9})\s*:\s*(\d{0,9})\s*\]")
 #: Elements of effects: the number of the effect, and of the element. An effect without elements has one.
 Elements = frozenset[tuple[int, int]]
 

@@ -79,7 +79,7 @@ def merged(rows: pd.DataFrame) -> pd.DataFrame:
     return cells[shown].assign(
         error_mm=cells["displacement_error_mm"],
         bound_mm=cells["reference_bound_mm"],
-        seconds=cells["load_case_s"],
+        seconds=cells["load_case_s"].where(cells["load_case_s"].between(0.0, np.inf, inclusive="neither")),
     )
 
 

@@ -37,6 +37,13 @@ def test_equal_runs_have_no_change(tmp_path: Path) -> None:
     assert float(line["ratio_most"]) == pytest.approx(1.2)
 
 
+def test_seconds_that_are_none_are_not_compared(tmp_path: Path) -> None:
+    for times in ((1.0, 0.0), (float("inf"), 1.0)):
+        sides = [write_rows(tmp_path / str(time), repeats([time] * 3)) for time in times]
+        assert compare(*sides, "--out", tmp_path / "out").exit_code == 0
+        assert lines(tmp_path / "out")[0]["ratio"] == ""
+
+
 CHANGES: dict[str, tuple[dict[str, Any], int, str]] = {
     "digits": ({"displacement_error_mm": 9e-8}, 1, "2.0 digits lost"),
     "few digits": ({"displacement_error_mm": 9e-9}, 0, ""),

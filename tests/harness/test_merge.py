@@ -64,6 +64,17 @@ def test_no_ratio_is_of_two_machines(both: tuple[Path, Path], tmp_path: Path) ->
         assert set(dense["K_s"]) == {seconds}
 
 
+@pytest.mark.parametrize("name", ["machine.json", "problems.jsonl", "suite.toml"])
+@pytest.mark.parametrize("content", [b"\xff{", b"[1]\n"])
+def test_a_damaged_file_is_named_before_anything_is_written(
+    both: tuple[Path, Path], tmp_path: Path, name: str, content: bytes
+) -> None:
+    (both[1] / name).write_bytes(content)
+    done = harness("merge", *both, "--out", tmp_path / "out")
+    assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
+    assert str(both[1] / name) in done.output
+
+
 def test_runs_that_do_not_belong_together_are_refused(both: tuple[Path, Path], tmp_path: Path) -> None:
     fast, slow = both
     out = tmp_path / "both"

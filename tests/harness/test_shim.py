@@ -327,6 +327,7 @@ def test_solve_says_the_same_of_one_joint(
             ("--patches", "patches.csv"),
             ["line 2", "on the junction", "line 3", "overlaps line 2", "x_min < x_max"],
         ),
+        (("--patches", "outlines.csv"), ["line 2, outline", "two of its edges cross", "a name of its own"]),
         (("--allow-gap", -1), ["limit_mm", "above 0"]),
         (("--share", 2), ["share", "at most 1"]),
         (("--cases", 10), ["--share", "take 59"]),
@@ -334,12 +335,30 @@ def test_solve_says_the_same_of_one_joint(
 )
 def test_wrong_questions_are_refused(strip: Path, tmp_path: Path, words: Any, said: list[str]) -> None:
     (tmp_path / "patches.csv").write_text("x_min,x_max,y_min,y_max\n-5,100,0,50\n50,150,0,50\n9,9,0,1\n")
-    words = [tmp_path / word if word == "patches.csv" else word for word in words]
+    corners = "a,0,0\na,90,50\na,90,0\na,0,50\n"  # a bow tie
+    (tmp_path / "outlines.csv").write_text(f"name,x,y\n{corners}b,100,0\nb,150,0\nb,150,50\n{corners}")
+    words = [tmp_path / word if str(word).endswith(".csv") else word for word in words]
     done = shim(strip, tmp_path / "out", *words)
     assert done.exit_code == 2
     for text in said:
         assert text in done.output
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("command", "row"), [("shim", 2), ("place", 0)])
+def test_no_answer_of_a_table_that_has_changed_is_used(
+    strip: Path, tmp_path: Path, command: str, row: int
+) -> None:
+    gaps, where = np.full((3, 84), 0.05), ("--gaps", tmp_path / "gaps.npy", "--share", 1)
+    how = ("--out", tmp_path / "out", "--allow-gap", 0.1, *where)
+    how += ("--stock", 0.1) if command == "shim" else ("--candidates", "3x1")
+    np.save(tmp_path / "gaps.npy", gaps)
+    assert harness(command, strip, *how).exit_code in (0, 4)
+    gaps[row] = 2.0
+    np.save(tmp_path / "gaps.npy", gaps)
+    done = harness(command, strip, *how)
+    assert done.exit_code == 2
+    assert "cases_key" in done.output
 
 
 def test_a_scene_without_fasteners_is_refused(strip: Path, tmp_path: Path) -> None:

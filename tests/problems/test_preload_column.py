@@ -64,6 +64,14 @@ def test_forces_are_the_sum_of_each(
     np.testing.assert_allclose([row["force_N"] for row in rows], [300.0, 50.0, 120.0], rtol=1e-15)
 
 
+@pytest.mark.parametrize("heading", ["preload_kN", "Preload kN", "preload in kN", "preload (kN)"])
+def test_a_unit_of_the_heading_is_read(tmp_path: Path, heading: str) -> None:
+    scene = scene_of(tmp_path, 'kind = "installed_fasteners"', table(heading))
+    np.testing.assert_allclose(
+        next(scene.effects_of(InstalledFasteners)).preload, [1000.0 * force for *_, force in HOLES]
+    )
+
+
 def test_a_column_of_one_value_is_a_number(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, 'kind = "fasteners"', "x,y,preload\n20,10,70\n50,25,70\n")
     same = scene_of(tmp_path, 'kind = "fasteners"\npreload = 70', "x,y\n20,10\n50,25\n")
@@ -114,6 +122,11 @@ def test_series_and_answers_keep_it_and_place_refuses_it(tmp_path: Path) -> None
         ('kind = "fasteners"\npreload = 5', table(), "left out: holes.csv has a column preload"),
         ('kind = "fasteners"', "x,y\n20,10\n", "preload"),
         ('kind = "fasteners"', table("preload [bar]"), "preload"),
+        *(
+            ('kind = "installed_fasteners"', table(heading), "a unit: -, n, kn")
+            for heading in ("preload [bar]", "preload_lbf", "preload force [N]")
+        ),
+        ('kind = "installed_fasteners"', table("preload,stage,stage"), "preload, stage, once each"),
         ('kind = "installed_fasteners"\npreload = [1, 2]', "x,y\n20,10\n", "one for each of 1 points"),
         ('kind = "clamps"\nclamping_force = 5\ncolumns = { preload = "F" }', table("F"), "columns"),
     ],

@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 from strip_scene import STRIP, write_strip
 
+from harness import validate
 from harness.series.load_case_source import GapCases
 from problems.build import load_case
 from problems.errors import InputError
@@ -131,6 +132,10 @@ BAD = [
     ("fasteners.preload=60", "[each] NAME(PARAMETERS)"),
     ("fasteners.preload=normal(1e999, 1)", "all finite"),
     ("fasteners.preload=normal(mean, 1)", "[each] NAME(PARAMETERS)"),
+    ("fasteners.preload=expon(loc=60, scale=1, scale=2)", "[each] NAME(PARAMETERS)"),
+    ("fasteners.preload=norminvgauss(1, 0.5, 60, 1)", "norminvgauss(a, b, loc=0, scale=1)"),
+    ("fasteners.preload=0 of normal(60, 5)", "[each] NAME(PARAMETERS)"),
+    (f"fasteners.preload={'9' * 5000} of normal(60, 5)", "[each] NAME(PARAMETERS)"),
     ("fasteners.points.x=normal(0, 20)", "on the junction"),
     ("fasteners.preload", "[each] NAME(PARAMETERS)"),
     ("pressure.value=each normal(0, 1)", "no elements at points"),
@@ -152,12 +157,21 @@ def test_all_faults_are_told_at_once(scene: Scene) -> None:
     assert keys == ["key", "key", "distribution", "distribution", "N, inputs"]
 
 
+def test_more_contributors_than_cases_are_refused(scene: Scene) -> None:
+    with pytest.raises(InputError, match="at most 10000000"):
+        drawn(scene, PRELOAD, count=None, contributors=2**30)
+
+
 def test_the_table_random_of_a_scene(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(f'{STRIP}\n[random]\nfasteners.preload = "normal(60, 5)"\n"pressure.value" = "norm()"\n')
     scene = read_scene(str(path))
     assert isinstance(scene, JointScene)
     assert scene.random == ("fasteners.preload=normal(60, 5)", "pressure.value=norm()")
+    assert validate(path) is not None
+    path.write_text(f'{STRIP}\n[random]\nfasteners.preload = "cauchy(60)"\npresure.value = "norm()"\n')
+    with pytest.raises(InputError, match=r"scene: \[random\](.|\n)*preload = -(.|\n)*'presure.value'"):
+        validate(path)
     path.write_text(f"{STRIP}\n[random]\nfasteners.preload = 5\n")
     with pytest.raises(InputError, match=r"random.fasteners.preload = 5"):
         read_scene(str(path))

@@ -248,6 +248,7 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([RELEASE], {}, "stage[0] (release).off = 'clamps'", "before it is set"),
     ([{"name": "1", "on": ["rivets[2:9]"]}], {}, "'rivets[2:9]'", "0 <= a < b <= 4"),
     ([{"name": "1", "on": ["tool[0:1]"]}], {}, "'tool[0:1]'", "it has no points"),
+    ([{"name": "1", "on": [f"clamps[0:{'9' * 5000}]"]}], {}, "clamps[0:9", "no such effect"),
     ([CLAMP, {"name": "clamp"}], {}, "stage[1].name = 'clamp'", "stage[0] has it"),
     ([{"on": ["clamps"]}], {}, "stage[0].name", "required"),
     ([CLAMP | {"on": "clamps"}], {}, "stage[0].on = 'clamps'", "must be a list"),
