@@ -7,11 +7,12 @@ Growth starts without shims. Each patch whose gap y is too large gets the least 
 at least t + y − limit, the contact problems are solved anew, and so on. A shim lowers the gap of its patch by
 no more than it grows. So, if it never lowered that of another patch, no plan that keeps the limit would be
 thinner anywhere than what growth ends in. But parts are levers: a shim may relieve its neighbours. So a plan
-is also made shim by shim, each time by the change for which (max(G, limit), mean of (Σ y⁸ / m)^⅛) is least, G
-the gap that all cases but those that may fail keep. From the better of both each shim in turn is taken out or
-made a step thinner, and the others grow; the best that is better is proven, until there is none. Then a shim
-nearby changes by a step as well. Plans are compared by their number of shims, then by Σ t · area, and tried
-in this order: the first that is proven is the best.
+is also made by a walk, each time by the change of one shim for which (max(G, limit), mean of (Σ y⁸ / m)^⅛) is
+least, G the gap that all cases but those that may fail keep. A walk goes on where a change does not help, but
+never to a plan twice. From the better of both each shim in turn is taken out or made a step thinner, or all
+are made thinner, and the others grow; the best that is better is proven, until there is none. Then a walk
+among plans with fewer shims, and one among those of less cost, begin at the best. Plans are compared by their
+number of shims, then by Σ t · area, and tried in this order: the first that is proven is the best.
 
 All of this is estimated in the cases that decide about a plan: the worst ones but those that may fail, none
 of which may fail in turn; in the end all of the worst, some of which may. A plan that keeps the limit in them
@@ -19,7 +20,7 @@ is proven in all cases. If it fails there, it grows further in the cases that ar
 those that decide.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from heapq import heapify, heappop, heappush
 from itertools import product
@@ -36,7 +37,8 @@ from problems.forms.assembly import Matrix
 from .study import ShimStudy
 
 AT_ONCE = 8  # plans estimated together
-WORST, NEAREST = 3, 4  # patches whose gap is to fall, and those near each whose shims change
+WORST, NEAREST = 3, 6  # patches whose gap is to fall, and those near each whose shims change
+IDLE = 6  # steps of a walk in succession that do not lower G
 ALL = inf, inf  # more than any cost
 
 
@@ -96,8 +98,9 @@ class ShimSearch(PlanSearch):
         cases = self.deciding(steps[0])
         for start in self._starts(cases):
             grown = next(self.strict.grown([(start, -1)], (), cases), ())
-            most = len(grown) or len(self.study.patches)
-            for plan in filter(None, (grown, self.strict.added(start, most, cases))):
+            below = self.cost(grown) if grown else ALL
+            walked, keeps = self.strict.walked(start, below, cases)
+            for plan in filter(None, (grown, walked if keeps or not grown else ())):
                 steps += (way := self.kept(plan))
                 kept += way[-1:] if way[-1].gap_mm <= self.limit_mm else []
             if kept:
@@ -125,22 +128,30 @@ class ShimSearch(PlanSearch):
             steps.append(self.whole(plan, "growth"))
         return steps
 
-    def added(self, plan: Plan, most: int, cases: Sequence[int]) -> Plan:
-        """The plan of at most so many shims after the best change of one shim after another, until it keeps
-        the limit by estimates, or none helps; none if growth got there with fewer.
+    def walked(self, plan: Plan, below: tuple[float, float], cases: Sequence[int]) -> tuple[Plan, bool]:
+        """The first plan of a walk among those that cost less which keeps the limit by estimates, or the best
+        of the walk, and whether it keeps the limit. The walk takes the best change of one shim each time,
+        whether it helps or not, but never to a plan twice; it ends after IDLE steps that did not lower G.
         """
-        (outcome,) = self.outcomes([plan], cases, ESTIMATED, plan)
-        idle = 0  # changes in succession that did not lower G
-        while self.gap(outcome) > self.limit_mm:
-            options = [option for option in self._changes(plan, outcome) if len(option) <= most]
-            made = self.outcomes(options, cases, ESTIMATED, plan) if options else []
+        base, seen, idle = plan, {plan}, 0
+        (outcome,) = self.outcomes([plan], cases, ESTIMATED, base)
+        best = (inf, inf), plan
+        while idle < IDLE:
+            less = self.cost(plan) < below
+            options = self._changes(plan, outcome) if less else [one for one, _ in self._fewer(plan)]
+            options = [one for one in options if one not in seen and self.cost(one) < below]
+            if not options:
+                break
+            made = self.outcomes(options, cases, ESTIMATED, base)
             values = [(self._value(one), option) for one, option in zip(made, options, strict=True)]
-            if idle > len(self.study.patches) or not values or min(values)[0] >= self._value(outcome):
-                return plan if most == len(self.study.patches) else ()
             k = values.index(min(values))
-            idle = idle + 1 if self.gap(made[k]) >= self.gap(outcome) else 0
             outcome, plan = made[k], options[k]
-        return plan
+            if self.gap(outcome) <= self.limit_mm:
+                return plan, True
+            seen.add(plan)
+            idle = 0 if values[k][0][0] < best[0][0] else idle + 1
+            best = min(best, values[k])
+        return best[1], False
 
     def _value(self, outcome: Outcome) -> tuple[float, float]:
         mean = float(np.mean(outcome.mean))
@@ -168,19 +179,16 @@ class ShimSearch(PlanSearch):
     def better(self, step: Step) -> Step | None:
         """A better plan that is proven, if any: one in which the same cases fail, or else other ones."""
         cases, strict = self.deciding(step), self.strict
-        better = self._descended(step, strict, cases, self._fewer)
-        better = better or self._descended(step, strict, cases, self._pairs)
+        better = self._descended(step, strict, cases)
+        for below in ((len(step.plan), 0.0), self.cost(step.plan)):  # fewer shims, or thinner ones
+            plan, keeps = ((), False) if better else strict.walked(step.plan, below, cases)
+            if keeps and (other := self.whole(plan, "walk")).gap_mm <= self.limit_mm:
+                better = other
         if better or not self.allowed:
             return better
-        return self._descended(step, self, super().deciding(step), self._fewer)
+        return self._descended(step, self, super().deciding(step))
 
-    def _descended(
-        self,
-        step: Step,
-        search: Self,
-        cases: tuple[int, ...],
-        moves: Callable[[Plan], list[tuple[Plan, int]]],
-    ) -> Step | None:
+    def _descended(self, step: Step, search: Self, cases: tuple[int, ...]) -> Step | None:
         """A better plan that is proven, if any, by one shim after another that is taken out or thinner, and
         by what others grow to: each time the cheapest by estimates.
         """
@@ -189,7 +197,7 @@ class ShimSearch(PlanSearch):
             plan = cheaper = base
             while cheaper:
                 plan = cheaper
-                grown = search.grown(moves(plan), base, cases, self.cost(plan))
+                grown = search.grown(self._fewer(plan), base, cases, self.cost(plan))
                 cheaper = next((one for one in grown if one not in refused), ())
             if plan == base:
                 return None
@@ -200,24 +208,15 @@ class ShimSearch(PlanSearch):
             cases = tuple(sorted({*cases, *failing}))
 
     def _fewer(self, plan: Plan) -> list[tuple[Plan, int]]:
-        """Plans with a shim less or a step thinner, and the number of its patch."""
+        """Plans with a shim less or a step thinner, and the number of its patch; all a step thinner."""
         t = self.sizes(plan)
-        return [
+        thinner = np.array([max([self.stock[0], *self._thinner(now)]) for now in t.flat]).reshape(t.shape)
+        fewer = [
             (self._with(t, k, end, option), k)
             for (k, end), now in np.ndenumerate(t)
             for option in self._thinner(now)
         ]
-
-    def _pairs(self, plan: Plan) -> list[tuple[Plan, int]]:
-        """Those plans with a shim nearby a step thicker, a step thinner or taken out, too."""
-        pairs = dict[tuple[Plan, int], None]()
-        for fewer, k in self._fewer(plan):
-            t = self.sizes(fewer)
-            for other, end in product(self.study.near[k, 1:NEAREST].tolist(), range(self.study.ends)):
-                now = float(t[other, end])
-                options = [*self._enough(now, 0.0)[:1], *self._thinner(now)]
-                pairs |= dict.fromkeys((self._with(t, other, end, option), k) for option in options)
-        return list(pairs)
+        return [*fewer, (self.plan(np.where(t, thinner, 0.0)), -1)]
 
     def grown(
         self,

@@ -397,7 +397,7 @@ def test_two_shims_change_together_where_one_alone_does_not_help(
         lambda some: [session.answer(q) for q in some], 1, 0, 0.0255, study, (0.038, 0.056, 0.06)
     )
     _, together = search.once(())
-    monkeypatch.setattr(ShimSearch, "_pairs", lambda self, plan: [])
+    monkeypatch.setattr(ShimSearch, "walked", lambda *_: ((), False))
     _, alone = search.once(())
     assert together.gap_mm <= 0.0255
     assert search.cost(together.plan) < search.cost(alone.plan)
