@@ -30,7 +30,7 @@ import numpy as np
 from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.compliance import ComplianceProducts
-from problems.forms.prepared import Prepared
+from problems.forms.prepared import EPS, Prepared
 from problems.forms.sprung_stiffness import SprungStiffness
 from solvers.base import DualLoadCase
 
@@ -125,7 +125,9 @@ class ContactSprings:
             if size <= enough:
                 break
             given = At @ inverse(A @ step)
-            alpha = size / float(step @ given)
+            if (curvature := float(step @ given)) * rho <= EPS * float(step @ step):
+                break  # closed contacts that depend on one another: no λ gives the rest
+            alpha = size / curvature
             change, closed = change + alpha * step, closed - alpha * given
             r, last = np.where(C, closed - y, 0.0), size
             size = float(r @ r)

@@ -179,7 +179,8 @@ class Proportioning:
         if not slope < 0:
             return False
         change = self._times_Q(d)
-        length = -slope / float(d @ change)
+        curvature = float(d @ change)
+        length = -slope / curvature if curvature > 0 else 1.0
         if length > 1 / 2 and (d < 0).any():
             length = 1.0
         self.lam, self.y = np.maximum(self.lam + length * d, 0.0), self.y + length * change

@@ -23,6 +23,8 @@ from problems.scene_files import read_scene, scene_names
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse_block import GeneralBlock
+from solvers.algorithms.block_pivoting import TrialSolution
+from solvers.algorithms.contact_sets import ContactSprings
 from solvers.base import Answer
 from solvers.kkt import with_x
 from solvers.registry import make_solver
@@ -141,6 +143,18 @@ def test_sets_end_soon_where_contacts_depend_on_one_another(n: int, seed: int, d
     answer = session_of("newton", Prepared(made.assembly)).next(made.load, None)
     assert answer.status == "solved"
     assert (answer.inner_iterations or 0) <= 40
+
+
+def test_a_set_of_contacts_that_contradict_one_another() -> None:
+    """A contact stands twice with two gaps, which no force closes: none is made, and the answer keeps the
+    smaller gap."""
+    K, A = sp.csc_array(2.0 * sp.eye_array(3)), sp.csc_array(np.eye(3)[:, [0, 0, 1]])
+    data, y = Prepared(Assembly(Stiffness.of(K), A)), np.array([-0.1, 0.1, 0.0])
+    closed = ContactSprings(data).set(TrialSolution(np.zeros(3), y, 0.0), np.ones(3, dtype=bool))
+    assert abs(A @ closed.lam).max() <= 1e-12
+    load = LoadCase(2 * np.ones(3), np.array([0.1, 0.3, 0.2]))
+    answer = session_of("newton", data).next(load, None)
+    np.testing.assert_allclose(answer.x, [0.1, 0.2, 1.0], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("with_nodes", [False, True])
