@@ -35,8 +35,7 @@ def frame(records: list[dict[str, Any]], by: Sequence[str] = ()) -> pd.DataFrame
     for name in [*NUMBERS, *FLAGS]:
         columns[name] = pd.to_numeric(rows[name], errors="coerce").astype(float) if name in rows else np.nan
     for name in TEXTS:
-        values = rows.get(name, ())
-        columns[name] = ["" if pd.isna(value) else str(value) for value in values] or ""
+        columns[name] = rows[name].map(lambda v: "" if pd.isna(v) else str(v)) if name in rows else ""
     rows = pd.DataFrame(columns, index=rows.index)
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
@@ -46,8 +45,10 @@ def frame(records: list[dict[str, Any]], by: Sequence[str] = ()) -> pd.DataFrame
 
 def _chosen(rows: pd.DataFrame, by: Sequence[str]) -> pd.Series[bool]:
     """The rows to keep: a search keeps its loosest tolerance within the limit, or else the tightest."""
-    line = [name for name in (*CELL, *by) if name != "tolerance"]
     searched, first = rows["searched"] == 1.0, rows["repeat"] == 0
+    if not searched.any():
+        return ~searched
+    line = [name for name in (*CELL, *by) if name != "tolerance"]
     within = rows["tolerance"].where(first & (rows["verdict"] == "within"))
     best = rows.assign(tolerance=within).groupby(line, dropna=False)["tolerance"].transform("max")
     last = rows.groupby(line, dropna=False)["tolerance"].transform("min")

@@ -46,7 +46,7 @@ OTHERS: list[Variant] = [
 
 
 def test_nothing_wrong_is_called_solved_and_no_bound_is_too_small() -> None:
-    log, count = Log(), draws(60, 50_000)
+    log, count = Log(), draws(40, 50_000)
     for index in range(count // LOADS):
         made = exact_problem(SEED, index)
         with log.contained(f"exact_problem({SEED}, {index}), {made.kind}", *LIMIT):

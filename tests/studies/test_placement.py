@@ -19,7 +19,7 @@ def test_farthest_points() -> None:
 @pytest.mark.slow
 def test_it_compares_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     small = placement.joint(200.0, 60.0, (11, 4), (2.0, 3.0))
-    sizes = {"CASES": 10, "SHARE": 0.9, "SMALL_CASES": 5, "SMALL_JOINTS": 2, "HOLES": ((1, 3),)}
+    sizes = {"CASES": 10, "SHARE": 0.9, "SMALL_CASES": 5, "SMALL_JOINTS": 1, "HOLES": ((1, 3),)}
     for name, value in {"JOINTS": {"small": (small, 100.0, (1, 4))}, **sizes}.items():
         monkeypatch.setattr(placement, name, value)
     placement.main(tmp_path)

@@ -1,6 +1,6 @@
 """Hostile files without end: each command ends soon with a documented exit code and words, and loses no file.
 
-A few hundred inputs; RIVETBENCH_LONG=1 takes 20 000, RIVETBENCH_LONG=N takes N.
+100 inputs; RIVETBENCH_LONG=1 takes 20 000, RIVETBENCH_LONG=N takes N.
 """
 
 import hashlib
