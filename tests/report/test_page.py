@@ -113,8 +113,11 @@ def test_a_published_page_is_small_and_alone(directory: Path, tmp_path: Path) ->
 
 @pytest.mark.parametrize(("made", "written"), MADE)
 def test_hostile_text_ends_no_script_and_begins_no_element(made: Any, written: Any, tmp_path: Path) -> None:
-    hostile = f"</script><script>alert(1)</script><!--<img src=x>{HOSTILE}"
+    """Nor is it too long, or mathematics, for a picture or a heading."""
+    endless = "_|\ud800$x_{$ \\frac{1}{0} $"
+    hostile = f"{endless}</script><script>alert(1)</script><!--<img src=x>{HOSTILE}{900 * endless}"
     report = written(made(tmp_path, hostile)).read_text("utf-8")
+    assert len(report.splitlines()[0]) < 400
     assert LITERAL in report
     for raw in ("<b>", "![i]", "`c`", "$a_b$", "*e*", "\n# h", "\x1b", "\u202e"):
         assert raw not in report
