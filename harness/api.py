@@ -25,7 +25,7 @@ from harness.placement.run import Placement
 from harness.planning.overrides import Overrides
 from harness.results.comparison import Incomparable
 from harness.scene import export as files
-from harness.scene import solution
+from harness.scene import import_files, solution
 from harness.scene import stress as plate_stress
 from harness.scene import validate as checks
 from harness.scene.solution import Solution
@@ -99,7 +99,7 @@ check_solver = in_turn(check.run)
 compare = in_turn(run_comparison.compare)
 export = in_turn(files.export)
 gate = in_turn(gates.gate)
-import_matrices = in_turn(files.import_matrices)
+import_matrices = in_turn(import_files.import_matrices)
 judge = in_turn(plain_arrays.judge)
 load_scene = in_turn(solution.load_scene)
 own_matrices = in_turn(plain_arrays.own_matrices)

@@ -79,7 +79,7 @@ def import_(
     Exit codes: 0 read and written, 2 wrong usage or bad input.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
-        from harness.scene.export import import_matrices
+        from harness.scene.import_files import import_matrices
         from harness.terminal.console import ConsoleReporter
 
         import_matrices(files, out, reporter=ConsoleReporter(console))

@@ -406,13 +406,17 @@ def test_two_shims_change_together_where_one_alone_does_not_help(
 class FewFigures(ShimSearch):
     """Each patch of 1 mm² asks for `needs` in one case, and in another, which may fail, for 0.09 mm more."""
 
-    needs = (0.03, 0.0, 0.05, 0.0)
+    needs, more = (0.03, 0.0, 0.05, 0.0), 0.09
+
+    def excess(self, t: Any) -> Any:
+        """By how much the gap of each patch is too large, mm."""
+        return np.array(self.needs) - t
 
     def outcomes(self, plans: Any, cases: Any, most: int, base: Any = None) -> list[Outcome]:
         made = []
         for plan in plans:
-            left = self.limit_mm + np.array(self.needs) - self.sizes(plan)[:, 0]
-            rows = [(*gap, 0.0, *[0.0] * 5, *gap, 0.0, 0.0) for gap in (left, left + 0.09)]
+            left = self.limit_mm + self.excess(self.sizes(plan)[:, 0])
+            rows = [(*gap, 0.0, *[0.0] * 5, *gap, 0.0, 0.0) for gap in (left, left + self.more)]
             made.append(Outcome(tuple(max(row) for row in rows), (0, 0), (0.0, 0.0), tuple(rows)))
         return made
 
@@ -437,6 +441,48 @@ def test_growth_gives_what_the_gaps_ask_for_in_all_cases_but_those_that_may_fail
     limit = search.cost(((0, 0.03), (1, 0.02), (2, 0.06)))
     below = search.grown([(plan, -1) for plan in [*whole, ((3, 0.01),)]], (), (0, 1), limit)
     assert max(map(search.cost, below)) < limit <= max(costs)
+
+
+class OnlyTogether(FewFigures):
+    """One of two shims alone makes all gaps larger, both close them; others make them larger still."""
+
+    more = 0.0
+
+    def excess(self, t: Any) -> Any:
+        gaps = {(): 0.01, (1,): 0.02, (2,): 0.02, (1, 2): -0.001}
+        return np.full(4, gaps.get(tuple(np.flatnonzero(t).tolist()), 0.03))
+
+
+class OnlyEven(FewFigures):
+    """Any thickness closes the gaps if it is the same everywhere."""
+
+    more = 0.0
+
+    def excess(self, t: Any) -> Any:
+        return (-0.001 if t.any() else 0.01) + t.max() - t
+
+
+def test_a_walk_passes_through_what_does_not_help(strip: Path) -> None:
+    """Never to a plan twice, and never to one that costs too much."""
+    study = session_of(strip, "4x1").study
+    assert isinstance(study, ShimStudy)
+    search = OnlyTogether(lambda some: [], 2, 0, 0.08, study, (0.01, 0.02))
+    plan, keeps = search.walked((), (inf, inf), (0,))
+    assert keeps
+    assert [k for k, _ in plan] == [1, 2]
+    assert not search.walked((), (2, 0.0), (0,))[1]
+    assert search.walked(tuple((k, 0.02) for k in range(4)), (4, 0.0), (0,))[1]
+    _, best = search.once(())
+    assert best.plan == ((1, 0.01), (2, 0.01))
+
+
+def test_all_shims_get_thinner_together(strip: Path) -> None:
+    study = session_of(strip, "4x1").study
+    assert isinstance(study, ShimStudy)
+    search = OnlyEven(lambda some: [], 2, 0, 0.08, study, (0.01, 0.02, 0.05))
+    better = search.better(search.whole(tuple((k, 0.05) for k in range(4))))
+    assert better is not None
+    assert better.plan == tuple((k, 0.01) for k in range(4))
 
 
 def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from commands import harness
 from matrix_files import PATHS, files_of
 from rich.console import Console
 
-from harness.scene.export import export, import_matrices
+from harness.scene.export import export
+from harness.scene.import_files import import_matrices
 from harness.scene.solve import solve_into
 from problems import formats
 from problems.build import load_case, prepared

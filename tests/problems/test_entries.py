@@ -10,7 +10,8 @@ import pytest
 import scipy.sparse as sp
 from commands import onto
 
-from harness.scene.export import export, import_matrices
+from harness.scene.export import export
+from harness.scene.import_files import import_matrices
 from problems import formats
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti

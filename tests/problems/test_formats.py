@@ -17,7 +17,8 @@ from matrix_files import PATHS, files_of
 from rich.console import Console
 from small_problems import make_load, make_prepared, solve_by_nnls
 
-from harness.scene.export import export, import_matrices, matrices
+from harness.scene.export import export, matrices
+from harness.scene.import_files import import_matrices
 from harness.scene.solve import solve_into
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import expected_error

@@ -20,7 +20,7 @@ from scipy.interpolate import RegularGridInterpolator
 from small_problems import by_nnls
 
 from harness.api import load_scene, own_matrices, random_gaps, solve
-from harness.scene.export import import_matrices
+from harness.scene.import_files import import_matrices
 from harness.scene.judge_file import read_answer
 from problems.build import load_case, prepared
 from problems.errors import InputError

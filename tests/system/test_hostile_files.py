@@ -10,7 +10,8 @@ import pytest
 from commands import harness
 from small_problems import make_load, make_prepared
 
-from harness.scene.export import import_matrices, matrices
+from harness.scene.export import matrices
+from harness.scene.import_files import import_matrices
 from problems import formats
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti
