@@ -28,6 +28,7 @@ from pydantic import (
 
 from problems.errors import Fault, InputError
 from problems.input.bounded_types import (
+    PLAIN,
     VALUE,
     WORD,
     Finite,
@@ -50,9 +51,9 @@ SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
 FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # no control characters, no slashes
 Auto = Annotated[Literal["auto"], Tag(WORD)]
-Repeats = Annotated[Annotated[int, Field(ge=1, le=1000), Tag(VALUE)] | Auto, Discriminator(is_word)]
+Repeats = Annotated[Annotated[int, Field(ge=1, le=1000), PLAIN, Tag(VALUE)] | Auto, Discriminator(is_word)]
 Tolerances = Annotated[Annotated[list[Positive], NonEmpty, Tag(VALUE)] | Auto, Discriminator(is_word)]
-Cases = Annotated[int, Field(ge=1, le=1_000_000)]
+Cases = Annotated[int, Field(ge=1, le=1_000_000), PLAIN]
 
 
 def pinned(requirement: str) -> str:
@@ -143,7 +144,7 @@ class Suite(BaseModel):
     threads: Annotated[list[PositiveInt], NonEmpty] = [2]
     time_limit_s: Positive = 60.0
     time_limit_by_size_s: dict[PositiveInt, Positive] = {}
-    times_best_form: Annotated[float, Field(ge=1)] | None = None
+    times_best_form: Annotated[float, Field(ge=1), PLAIN] | None = None
     memory_limit_mib: PositiveInt = 8192
     reference_limit_s: Positive | None = None
     limit_mm: Positive = 1e-7

@@ -55,6 +55,6 @@ def each_joint(
     words = f"{out_of(kept, count, 'joint')} can be kept within the limits, {100 * kept / count:.1f} %"
     words += f" ({100 * CONFIDENCE:g} % interval {100 * low:.1f} to {100 * high:.1f} %)"
     none = "no shim is needed" if kept == count else "none of these needs a shim"
-    words += f", with {counted(pieces, 'shim')} in all" if pieces else f"; {none}"
+    words += f", with {counted(pieces, 'shim')} in all" if pieces else f"; {none}" * bool(kept)
     passed = count - kept <= most
     return joints, before, after, f"{'PASS' if passed else 'FAIL'}: {words}, proven.", passed

@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, Field, StringConstraints, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, StringConstraints, ValidationError
 
 from problems.errors import Fault, InputError
 
@@ -19,9 +19,18 @@ LARGEST = 1e15  # in mm, N and units made of them
 MIB = 2**20
 M = TypeVar("M", bound=BaseModel)
 
-Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
-Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+
+def _no_other(value: object) -> object:
+    if isinstance(value, str | bool):
+        raise ValueError("must be a valid number")
+    return value
+
+
+#: Of a number: text and truth values are none.
+PLAIN = BeforeValidator(_no_other)
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False), PLAIN]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False), PLAIN]
+Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False), PLAIN]
 
 
 def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
@@ -33,7 +42,7 @@ def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
 #: A length along an axis, from start to stop.
 Range = Annotated[tuple[Finite, Finite], AfterValidator(_ascending)]
 #: Seeds that every reader of JSON keeps exactly.
-Seed = Annotated[int, Field(ge=0, lt=2**53)]
+Seed = Annotated[int, Field(ge=0, lt=2**53), PLAIN]
 #: A name that a picture, a table and a file can show: one line without control characters.
 ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
 Name = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=ONE_LINE)]

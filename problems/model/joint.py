@@ -19,13 +19,13 @@ import scipy.sparse as sp
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded_types import Name, Positive, with_units
+from problems.input.bounded_types import PLAIN, Name, Positive, with_units
 
 from .plate import Plate
 from .surface import Grid
 
 MOST, MOST_NODES = 100_000, 10**7  # mesh lines, nodes; what fits in memory is another question
-Nodes = Annotated[int, Field(ge=2, le=MOST)]
+Nodes = Annotated[int, Field(ge=2, le=MOST), PLAIN]
 SHORT = 20.0  # mm, a junction that may have been given in metres
 SLENDER = 50.0  # an element's longer side to its shorter
 SOFT, STIFF = 1e3, 1e6  # N/mm², around the moduli of plastics and metals
@@ -60,7 +60,7 @@ class Extension(Table):
     """The part's plate beyond the junction: its length in mm and its elements across that length."""
 
     length: Annotated[Positive, "mm"]
-    elements: Annotated[int, Field(ge=1, le=MOST)]
+    elements: Annotated[int, Field(ge=1, le=MOST), PLAIN]
 
 
 class Part(Table):
@@ -72,7 +72,7 @@ class Part(Table):
     name: Name
     thickness: Annotated[Positive, "mm"]
     young: Annotated[Positive, "N/mm²"] = 70e3
-    poisson: Annotated[float, Field(ge=0, lt=0.5)] = 0.33
+    poisson: Annotated[float, Field(ge=0, lt=0.5), PLAIN] = 0.33
     south: Extension | None = None
     north: Extension | None = None
     clamped: tuple[Literal["south", "north"], ...] = ()

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.bounded_types import Finite, NotNegative
+from problems.input.bounded_types import PLAIN, Finite, NotNegative
 from problems.input.scan_points import crowded
 
 from .effect import ContactEffect, Effect, ForceEffect, SpringEffect
@@ -25,8 +25,8 @@ class Pattern(Table):
     on_nodes : whether each point is moved to the nearest node of the junction.
     """
 
-    columns: Annotated[int, Field(ge=1, le=10_000)]
-    rows: Annotated[int, Field(ge=1, le=10_000)]
+    columns: Annotated[int, Field(ge=1, le=10_000), PLAIN]
+    rows: Annotated[int, Field(ge=1, le=10_000), PLAIN]
     edge: Annotated[NotNegative, "mm"] = 0.0
     on_nodes: bool = False
 

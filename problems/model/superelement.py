@@ -23,7 +23,7 @@ from problems.errors import InputError
 from problems.formats import DENSEST, read_stiffness
 from problems.forms.assembly import Indices, Matrix
 from problems.input import matrix_files
-from problems.input.bounded_types import Name, regular_file
+from problems.input.bounded_types import PLAIN, Name, regular_file
 from problems.input.user_matrices import SMALL, UNCHANGED, checked
 from problems.storage import fingerprint
 
@@ -36,7 +36,7 @@ LOST = 0.05  # the largest share of a normal along degrees of freedom that K doe
 FREE = 1e-9  # of max |K||r|: a smaller Kr is no force; held parts have 1e-4 and more, free ones 1e-12
 SHARE = 0.3  # of a motion's largest component: smaller components do not name it
 DIRECTIONS = "xyz"
-Dof = Annotated[int, Field(ge=1, le=6)]
+Dof = Annotated[int, Field(ge=1, le=6), PLAIN]
 
 
 class SuperelementTable(Table):

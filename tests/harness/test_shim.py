@@ -216,7 +216,8 @@ def test_each_joint_has_shims_of_its_own(
 
 
 @pytest.mark.parametrize(
-    ("failing", "share"), [(0, 0.95), (3, 0.95), (4, 0.95), (10, 0.95), (11, 0.95), (9, 0.9), (1, 1.0)]
+    ("failing", "share"),
+    [(0, 0.95), (3, 0.95), (4, 0.95), (10, 0.95), (11, 0.95), (9, 0.9), (1, 1.0), (200, 0.9)],
 )
 def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, share: float) -> None:
     """By another implementation of the interval; of a table of joints the share itself counts."""
@@ -231,11 +232,12 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
     for cases in (Listed((bare,) * count), gaps):
         study: Any = SimpleNamespace(cases=cases)
         *_, words, passed = each_joint(journal, study, Goal(limit, share), STOCK, SILENT)  # type: ignore[arg-type]
-        low, _ = proportion(count - failing, count)
+        low = np.nan_to_num(proportion(count - failing, count)[0])
         needed = 1 - failing / count if cases is gaps or share == 1 else low
         assert passed == (needed >= share)
         assert f"interval {100 * low:.1f} to " in words
         assert ("no shim is needed" in words) == (not failing)
+        assert ("needs a shim" in words) == (0 < failing < count)
 
 
 def proportion(kept: int, count: int) -> tuple[float, float]:

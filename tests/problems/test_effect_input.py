@@ -66,6 +66,14 @@ ALONE = [
     ),
     ('kind = "fasteners"\npreload = "much"\npoints = [[1, 1]]', "preload", "number; in N"),
     ('kind = "pressure"\npart = "a"\nvalue = inf', "value", "in N/mm²"),
+    ('kind = "pressure"\npart = "a"\nvalue = "1e-4"', "value", "a valid number; in N/mm²"),
+    ('kind = "initial_gap"\nmean = true', "mean", "a valid number; in mm"),
+    ('kind = "fasteners"\npreload = [5, true]\npoints = [[1, 1], [9, 9]]', "preload.1", "a valid number"),
+    (
+        'kind = "fasteners"\npreload = 5\npattern = { columns = true, rows = 1 }',
+        "pattern.columns",
+        "a valid n",
+    ),
     ('kind = "stringers"\npart = "a"\npitch = 9\nstart = 40\nstop = 20\nI = 1', "start, stop", "0 … 90 mm"),
 ]
 
