@@ -159,8 +159,6 @@ def shim(
         thicknesses = stock_of(stock)
     except InputError as error:
         faults += error.faults
-    if taper and each:
-        faults.append(Fault("--taper", "with", "--each", "one of both"))
     if faults or not isinstance(read, JointScene):
         raise InputError(faults)
     bare = last_scene(read)

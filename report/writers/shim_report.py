@@ -43,16 +43,19 @@ def write(directory: Path) -> Path:
     blocks, files = list[Block](), dict[str, pd.DataFrame]()
     with style.applied():
         if joints := record.get("joints"):
-            pieces = [(joint["joint"], int(k), t) for joint in joints for k, t in joint.pop("plan")]
-            table = pd.DataFrame(pieces, columns=["joint", "patch", "thickness_mm"])
-            used = table.groupby("patch").agg(joints=("joint", "size"), thickness_mm=("thickness_mm", "max"))
+            sizes = ["thickness_mm", "thickness_end_mm"][: 1 + record["taper"]]
+            pieces = [(joint["joint"], int(k), *t) for joint in joints for k, *t in joint.pop("plan")]
+            table = pd.DataFrame(pieces, columns=["joint", "patch", *sizes])
+            thickest = table.assign(most=table[sizes].max(axis=1)).groupby("patch")
+            used = thickest.agg(joints=("joint", "size"), thickness_mm=("most", "max"))
             patches = patches.join(used).fillna({"joints": 0, "thickness_mm": 0.0})
             heads = [number("joints with it", "joints", whole), number("thickest, mm", "thickness_mm")]
             label, what = "joints", f"in how many of {counted(len(joints), 'joint')}"
-            each = table.pivot(index="joint", columns="patch", values="thickness_mm")
-            each.columns = pd.Index(patches["patch"][each.columns])
+            each = table.pivot(index="joint", columns="patch", values=sizes)
+            ends = [(patches["patch"][at[1]], ", other end" * (at[0] != sizes[0])) for at in each.columns]
+            each.columns = pd.Index(["".join(end) for end in ends])
             files["joints"] = pd.DataFrame(joints).join(each, on="joint")
-            blocks += _stock(table.join(patches["area_mm2"], on="patch"))
+            blocks += _stock(table.join(patches["area_mm2"], on="patch"), sizes)
         shims = patches[patches["thickness_mm"] > 0]
         ranges = [Column(f"{axis}, mm", partial(_range, axis)) for axis in "xy"]
         columns = [word("patch", "patch"), *ranges, *heads, *(number(*pair) for pair in COLUMNS.items())]
@@ -113,15 +116,21 @@ def _largest(record: dict[str, Any], key: str, shims: int) -> str:
     return f"{both}{at}; {record[name]:g} {unit} allowed"
 
 
-def _stock(pieces: pd.DataFrame) -> list[Block]:
-    """What to order: how many pieces of each thickness all joints take. pieces : one line each."""
+def _stock(pieces: pd.DataFrame, sizes: list[str]) -> list[Block]:
+    """What to order: how many pieces of each thickness all joints take, of a tapered one from its thin end.
+
+    pieces : one line each. sizes : their columns of thicknesses.
+    """
+    pieces[sizes] = np.sort(pieces[sizes], axis=1)
     of = {"pieces": ("joint", "size"), "joints": ("joint", "nunique"), "area_mm2": ("area_mm2", "sum")}
-    table = pieces.groupby("thickness_mm").agg(**of).reset_index()
+    table = pieces.groupby(sizes).agg(**of).reset_index()
+    names = [" to ".join(f"{t:g}" for t in row) for row in table[sizes].to_numpy()]
     drawing = style.figure(2.6)
     axes = drawing.subplots()
-    axes.bar(table["thickness_mm"].map("{:g}".format), table["pieces"], color=style.BLUE)
+    axes.bar(names, table["pieces"], color=style.BLUE)
     axes.set(xlabel="thickness, mm", ylabel="pieces")
-    shown = [number("thickness, mm", "thickness_mm"), number("pieces", "pieces", whole)]
+    heads = "thickness, mm", "at its other end, mm"
+    shown = [*(number(*pair) for pair in zip(heads, sizes, strict=False)), number("pieces", "pieces", whole)]
     shown += [number("joints", "joints", whole), number("area, mm²", "area_mm2")]
     caption = "*What to order*: the pieces of each thickness that all joints take."
     return [Figure("stock", "*Pieces of each thickness.*", drawing), Table("stock", caption, table, shown)]

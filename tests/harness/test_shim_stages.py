@@ -1,18 +1,21 @@
 """Shims in a scene with stages, and tapered ones: plans against `solve` on the scene with their effects."""
 
 import json
+from collections import Counter
 from dataclasses import replace
 from itertools import product
 from math import inf
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from commands import harness
-from small_joints import FASTENERS, GAP, STAGED, two_parts
+from small_joints import FASTENERS, GAP, STAGED, two_parts, with_gap
 
 from harness import solve, stresses
 from harness.placement.session import PlanSession, Question
+from harness.series.load_case_source import GapCases
 from harness.series.staged import last_scene
 from harness.shimming.patches import patches_of
 from harness.shimming.search import ShimSearch
@@ -84,6 +87,32 @@ def test_the_least_of_all_tapered_plans_is_found(tmp_path: Path) -> None:
     _, best = search.once(())
     assert best.gap_mm <= limit
     assert search.cost(best.plan) == min(search.cost(plan) for plan, gap in gaps.items() if gap <= limit)
+
+
+def test_each_joint_has_tapered_shims_of_its_own(tmp_path: Path) -> None:
+    """What `solve` says of each joint with its shims; the stock is ordered from its thin end."""
+    path, out = tmp_path / "scene.toml", tmp_path / "out"
+    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS)
+    asked = ("--allow-gap", 0.03, "--stock", "0.02,0.05", "--patches", "2x1", "--taper", "--each")
+    done = harness("shim", path, *asked, "--cases", 2, "--share", 1, "--out", out)
+    assert done.exit_code in (0, 4), done.output
+    scene, study = read_scene(str(path)), session_of(path, "2x1", ends=2).study
+    assert isinstance(scene, JointScene)
+    cases, joints = GapCases(count=2).of(scene, "dual"), pd.read_csv(out / "joints.csv")
+    record, pieces = json.loads((out / "shim.json").read_text())["joints"], list[tuple[float, ...]]()
+    for k, joint in enumerate(record):
+        shims = [study.effect(tuple(item)) for item in joint["plan"]]
+        effects = (*(effect for effect in scene.effects if effect.kind != "initial_gap"), *shims)
+        gap = solve(with_gap(replace(scene, effects=effects), cases.load(k).g)).gap.max()
+        assert (gap <= 0.03) == joint["kept"] == joints["kept"][k]
+        for patch, *ends in joint["plan"]:
+            name = study.patches[int(patch)].name  # type: ignore[attr-defined]
+            assert [joints[name][k], joints[f"{name}, other end"][k]] == ends
+            pieces.append(tuple(sorted(ends)))
+    stock = pd.read_csv(out / "stock.csv")
+    columns = zip(stock["thickness_mm"], stock["thickness_end_mm"], strict=True)
+    assert dict(zip(columns, stock["pieces"], strict=True)) == Counter(pieces)
+    assert pieces
 
 
 def test_the_command_writes_both_ends_of_a_tapered_shim(tmp_path: Path) -> None:
