@@ -40,7 +40,7 @@ def rows_of(directory: Path) -> list[dict[str, object]]:
     return [{key: row[key] for key in row if key not in timed} for row in series_file.rows(directory)]
 
 
-@pytest.mark.usefixtures("without_report")
+@pytest.mark.usefixtures("without_report", "without_pictures")
 def test_the_table_of_a_scene_and_its_options_are_drawn(scene: Path, tmp_path: Path) -> None:
     more = "--random", "pressure.value=norm(1e-4, 1e-6)", "--allow-gap", 0.4
     for out, counts in (("once", (9,)), ("twice", (4, 9))):
@@ -128,6 +128,7 @@ def test_a_key_of_K_has_a_K_for_each_of_its_values(tmp_path: Path) -> None:
     assert np.isnan(slopes).tolist() == [True, True, False]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_searches_draw_what_a_series_draws(scene: Path, tmp_path: Path) -> None:
     """The proven gaps of the scene's own fasteners, and the largest of the preloads that are drawn."""
     assert harness("series", scene, "--cases", 3, "--out", tmp_path / "series").exit_code == 0

@@ -102,6 +102,7 @@ def test_solve_writes_pictures_tables_and_forces(folder: Path, tmp_path: Path) -
     assert pushed[:45].sum() == pytest.approx(-pushed[45:].sum())
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_two_plans_a_series_and_a_run(folder: Path, tmp_path: Path) -> None:
     text = (folder / "edited.toml").read_text()
     (folder / "more.toml").write_text(text.replace("preload = 300.0", "preload = 600.0"))
@@ -120,6 +121,7 @@ def test_two_plans_a_series_and_a_run(folder: Path, tmp_path: Path) -> None:
     assert (tmp_path / "run" / "report" / "report.md").is_file()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_what_is_exported_is_the_same_problem(folder: Path, tmp_path: Path) -> None:
     done = harness("export", folder / "edited.toml", "--format", "npz", "--out", tmp_path / "out.npz")
     assert done.exit_code == 0, done.output
@@ -134,6 +136,7 @@ def test_what_is_exported_is_the_same_problem(folder: Path, tmp_path: Path) -> N
         np.testing.assert_allclose(again["x"], first["unknowns"], atol=1e-9)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_example_is_solved_and_made_again(tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "examples" / "own-parts"
     done = harness("solve", example / "joint.toml", "--out", tmp_path / "out")

@@ -43,6 +43,7 @@ def rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_springs_and_contacts_balance_what_the_parts_without_them_resist(tmp_path: Path) -> None:
     """K₀, A, f₀ of the scene without springs: K₀x + Aλ − f₀ is at each tied node the pull of its spring."""
     tied = write(tmp_path / "tied.toml", JOINT + FASTENERS + SPRINGS)
@@ -120,6 +121,7 @@ points = [[0.0, 0.0, 0.1], [160.0, 0.0, 0.26], [0.0, 80.0, 0.14], [160.0, 80.0, 
 
 
 @pytest.mark.parametrize("nodes", [(17, 9), (6, 4)])
+@pytest.mark.usefixtures("without_pictures")
 def test_a_plane_gap_is_the_same_on_any_mesh(nodes: tuple[int, int], tmp_path: Path) -> None:
     bare = two_parts(160.0, 80.0, (9, 5), "south") + PLANE
     first = write(tmp_path / "first.toml", bare)
@@ -157,6 +159,7 @@ def test_superelements_are_compared_where_both_have_contacts(turned: bool, tmp_p
     np.testing.assert_allclose(one, other, atol=1e-9)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_mesh_decides_a_verdict_near_the_limit(tmp_path: Path) -> None:
     """Every second line of the fine mesh is one of the coarse mesh: there nothing is interpolated."""
     first = write(tmp_path / "coarse.toml", JOINT + FASTENERS)
