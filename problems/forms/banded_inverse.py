@@ -170,6 +170,11 @@ class Windows:
             yield max(start - WINDOW_LINES * across, 0), start, min(start + across, m)
 
     @property
+    def factorisation_flops(self) -> float:
+        """Operations of a Cholesky factorisation of M."""
+        return float(len(self.order) * ((WINDOW_LINES + 1) * self.across) ** 2)
+
+    @property
     def work(self) -> float:
         """Operations of `of_windows`: per line with w contacts in its window w³/3 + 2w² across."""
         starts = np.arange(0, len(self.order), self.across)

@@ -88,7 +88,7 @@ def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
     where some block is not positive definite in that.
 
     There is no M where contacts depend on one another, where K has no band, where e ← e − MQe converges
-    slowly, and for contacts all over an area, where M takes longer than some factorisations of K; the
+    slowly, and for contacts all over an area, where M and its factors take longer than those of K; the
     diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is indefinite.
     """
     lengths = abs(assembly.A).max(axis=0).toarray()
@@ -99,7 +99,8 @@ def of_products(assembly: Assembly, like: Assembly) -> ApproximateInverse:
 
 def _of_unit_contacts(assembly: Assembly, like: Assembly) -> ApproximateInverse:
     windows, inverse = _along_bands(assembly), None
-    worth = windows is not None and windows.work <= SETS * assembly.K.factorisation_flops
+    of_K = SETS * assembly.K.factorisation_flops
+    worth = windows is not None and windows.work + SETS * windows.factorisation_flops <= of_K
     if windows is not None and worth and not assembly.dependent:
         if _single_might_do(assembly):
             with suppress(np.linalg.LinAlgError):

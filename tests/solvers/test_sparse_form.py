@@ -9,8 +9,9 @@ import pytest
 import scipy.sparse as sp
 from matrix_files import write_mtx
 from scipy.optimize import isotonic_regression
+from scipy.spatial import KDTree
 from small_problems import make_load, make_prepared, make_strips, problem_in, solve_by_nnls
-from sparse_matrices import band_matrix, graph_matrix
+from sparse_matrices import band_matrix, graph_matrix, symmetric
 
 from harness.solving.session import SolverSession
 from harness.verification.reference import best_of_candidates, proof_of, reference
@@ -208,6 +209,20 @@ def test_the_smallest_joint_of_the_scaling_in_a_few_products() -> None:
     answer = session_of("mprgp", data).next(load, None)
     assert answer.status == "solved"
     assert answer.details["products"] <= 20
+
+
+def test_no_m_whose_factors_cost_more_than_those_of_k() -> None:
+    """An obstacle under every second node of a random graph in the plane, a few of them touched: M took
+    twenty times as long as all sets with springs."""
+    random = np.random.default_rng(1)
+    near = KDTree(places := random.random((1500, 2))).query(places, 7)[1]
+    ends = np.repeat(near[:, 0], 6), near[:, 1:].ravel()
+    K = symmetric(random, *ends, 1500)
+    A = sp.eye_array(1500, format="csc")[:, ::2]
+    data, load = Prepared(Assembly(Stiffness.of(K), A)), LoadCase(random.normal(size=1500), np.full(750, 0.2))
+    answer = session_of("newton", data).next(load, None)
+    assert data.approximate_inverse.M is None
+    check(answer, Prepared(Assembly(Stiffness.of(K.toarray()), A)), load)
 
 
 def test_contacts_all_over_an_area_are_refused_with_the_reason() -> None:
