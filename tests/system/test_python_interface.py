@@ -45,6 +45,7 @@ def test_a_docstring_is_whole(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", api.__all__)
+@pytest.mark.usefixtures("without_pictures")
 def test_its_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In an empty folder beside the examples."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
