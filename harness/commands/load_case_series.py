@@ -122,6 +122,8 @@ def run_series(
     faults = cases.faults(sweep)
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
+    if options.plugin and solver != (name := Path(options.plugin).stem):
+        faults.append(Fault("--solver", "name", solver, f"{name}, that of --plugin {options.plugin}"))
     (made,) = described([(solver, {})], options.plugin, "--solver", reporter)
     if options.form and options.form not in made.forms:
         faults.append(Fault("--form", "form", options.form, f"{solver} takes {' and '.join(made.forms)}"))
