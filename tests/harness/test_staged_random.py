@@ -117,6 +117,8 @@ def test_spring_back_of_a_linear_joint() -> None:
         released = (STIFFNESS * first + preload) * c / (1 + STIFFNESS * c)
         assert row["initial_gap.mean"] - gap[2:4].mean() == pytest.approx(released, abs=1e-6)
         assert sum(row["fastener_forces_N"]) == pytest.approx(released / c, rel=1e-7)
+        gaps = row["stages_max_gap_mm"]
+        assert gaps["rivet"] < gaps["tack"] - 0.1 * preload * c / (1 + STIFFNESS * c)
     assert len({row["max_gap_mm"] for row, _ in results.values()}) == 2
 
 
@@ -170,7 +172,8 @@ def test_what_a_stage_locks_is_not_drawn(tmp_path: Path) -> None:
 
 def test_searches_draw_what_a_series_draws(tmp_path: Path) -> None:
     """The largest gaps of the scene's own tacks, and without further shims; the largest of the forces."""
-    scene = joint_scene(scene_file(tmp_path))
+    text = STAGED.replace("[[10.0, 40.0]]", "[[50.0, 10.0], [90.0, 10.0]]")
+    scene = joint_scene(scene_file(tmp_path, text))
     movable, patches = MovableFasteners.of(scene), patches_of(scene.joint, "1x1")
     job = job_of(scene, {name: law for name, law in LAWS.items() if not name.startswith("fasteners")})
     rows = [row for row, _ in results_of(job).values()]
