@@ -42,10 +42,8 @@ class Method(Solver):
         """The state; a failed answer if Q or K is not positive definite."""
         try:
             return self.state(data)
-        except NotPositiveDefinite as error:
-            return failed(f"K is not positive definite: {error}")
         except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
+            return _indefinite(error, "Q")
 
     def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         return state if isinstance(state, Answer) else replace(state, start=start)
@@ -56,7 +54,7 @@ class Method(Solver):
         try:
             return self.solved(ready, load, tolerance)
         except np.linalg.LinAlgError as error:
-            return failed(str(error))
+            return _indefinite(error, "a matrix of the method")
 
     def state(self, problem: Problem) -> Any:
         """The data that load cases share: a `State`, or a failed answer for all of them."""
@@ -70,6 +68,11 @@ class Method(Solver):
     @abstractmethod
     def solved(self, ready: Any, load: Any, tolerance: float) -> Answer:
         """The answer to a load case: a DualLoadCase in the dual form."""
+
+
+def _indefinite(error: np.linalg.LinAlgError, matrix: str) -> Answer:
+    matrix = "K" if isinstance(error, NotPositiveDefinite) else matrix
+    return failed(f"{matrix} is not positive definite: {error}")
 
 
 def first_point(start: DualStart | None, load: DualLoadCase) -> tuple[Vector, Vector]:
