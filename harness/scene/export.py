@@ -6,8 +6,8 @@
 The arrays are P, q, and G, h or lb; with the reference also x (mm), lam (the multipliers of Gz ≤ h, N),
 bound_mm, the proven bound on max|x − x*|, and limit_mm, the largest error that an answer may have. They are
 written as a folder of Matrix Market files, one per array and with 17 digits, or as one .npz; about.json, or
-the texts in the .npz, name the problem. HiGHS writes P, q, G, h, lb as MPS, with 15 digits. The programs of a
-suite are a test set of qpbenchmark, a Parquet file.
+the texts in the .npz, name the problem. MPS has P, q, G, h, lb. The programs of a suite are a test set of
+qpbenchmark, a Parquet file.
 """
 
 import json
@@ -42,6 +42,7 @@ from report.document.numbers import counted
 
 Arrays = dict[str, Any]
 #: The columns of a test set, https://github.com/qpsolvers/qpbenchmark; matrices are dense, row by row.
+AT_ONCE = 2**20  # lines of a text
 TEST_SET = ("P", "q", "G", "h", "A", "b", "lb", "ub", "name")
 
 
@@ -180,19 +181,30 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
 
 
 def _write_mps(path: Path, arrays: Arrays, about: Arrays) -> None:
-    import highspy
-
+    """Write free MPS with QUADOBJ. Every column has its cost, also 0: readers take their order from these."""
     q, n = arrays["q"], len(arrays["q"])
-    P, G = sp.csc_array(sp.tril(arrays["P"])), sp.csc_array(arrays.get("G", (0, n)))
     lb, h = arrays.get("lb", np.full(n, -np.inf)), arrays.get("h", np.zeros(0))
-    highs, kinds = highspy.Highs(), (1, 1, 1, 0.0)  # by columns, a triangle, a minimum, no constant
-    highs.silent()
-    highs.setOptionValue("small_matrix_value", 1e-12)  # HiGHS leaves smaller entries out; it takes no less
-    bounds = lb, np.full(n, np.inf), np.full(len(h), -np.inf), h
-    columns = (part for M in (G, P) for part in (M.indptr, M.indices, M.data))
-    highs.passModel(n, G.shape[0], G.nnz, P.nnz, *kinds, q, *bounds, *columns, np.zeros(n, dtype=np.int32))
-    highs.writeModel(str(path.with_suffix(".mps")))
-    path.with_suffix(".mps").replace(path)
+    P, G = sp.coo_array(sp.csc_array(sp.tril(arrays["P"]))), sp.coo_array(arrays.get("G", (0, n)))
+    rows = np.array(["Obj", *(f"r{i}" for i in range(len(h)))], dtype=object)
+    columns = np.array([f"c{j}" for j in range(n)], dtype=object)
+    at_row, at_column = np.r_[np.zeros(n, dtype=int), 1 + G.row], np.r_[np.arange(n), G.col]
+    order = np.argsort(at_column, kind="stable")
+
+    def write(heading: str, *fields: Any) -> None:
+        """Lines of fields; numbers with all of their digits."""
+        file.write(f"{heading}\n")
+        for start in range(0, len(fields[-1]), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            table = {k: field if isinstance(field, str) else field[some] for k, field in enumerate(fields)}
+            pd.DataFrame(table).to_csv(file, sep=" ", header=False, index=False)
+
+    with path.open("w", encoding="ascii", newline="") as file:
+        write("NAME\nROWS\n N Obj", "", "L", rows[1:])
+        write("COLUMNS", "", columns[at_column][order], rows[at_row][order], np.r_[q, G.data][order])
+        write("RHS", "", "RHS", rows[1:], h)
+        write("BOUNDS", "", "FR", "BND", columns[np.isneginf(lb)])
+        write("QUADOBJ", "", columns[P.col], columns[P.row], P.data)
+        file.write("ENDATA\n")
 
 
 WRITERS = {".npz": _write_npz, ".mps": _write_mps, ".qps": _write_mps}
