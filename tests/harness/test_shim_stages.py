@@ -73,6 +73,32 @@ def test_a_tapered_shim_is_linear_along_its_longer_side(tmp_path: Path) -> None:
     np.testing.assert_allclose(two, ramp, rtol=1e-14)
 
 
+def test_a_patch_has_halves_and_neighbours(tmp_path: Path) -> None:
+    """Contacts half-way count for both ends; the nearest patch comes first."""
+    path = tmp_path / "scene.toml"
+    path.write_text(two_parts(length=200.0, nodes=(21, 5)) + GAP + FASTENERS)
+    study = session_of(path, "4x1", ends=2).study
+    assert isinstance(study, ShimStudy)
+    assert study.near[[0, 3]].tolist() == [[0, 1, 2, 3], [3, 2, 1, 0]]
+    study = session_of(path, "2x1", ends=2).study
+    assert isinstance(study, ShimStudy)
+    x = study.places[:, 0]
+    for k, (first, middle, last) in enumerate([(0.0, 50.0, 100.0), (100.0, 150.0, 200.0)]):
+        start, end = study.halves[2 * k : 2 * k + 2]
+        inside = study.masks[k]
+        np.testing.assert_array_equal(start, inside & (x >= first) & (x <= middle))
+        np.testing.assert_array_equal(end, inside & (x >= middle) & (x <= last))
+
+
+def test_a_fastener_that_pushes_has_a_force_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(two_parts() + GAP + FASTENERS)
+    forces = [{"force_N": -50.0}, {"force_N": 20.0}]
+    monkeypatch.setattr("harness.shimming.study.fastener_forces", lambda *_: forces)
+    (outcome,) = session_of(path, "2x1", (100.0, inf)).answer(Question(((),), (0,)))
+    assert outcome.further[0][-2] == pytest.approx(50.0)
+
+
 def test_the_least_of_all_tapered_plans_is_found(tmp_path: Path) -> None:
     path, stock = tmp_path / "scene.toml", (0.02, 0.05)
     path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS)

@@ -259,18 +259,27 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "if s > t and": ("if",),
         "not waiting or kept[0] < waiting[0][:2]": ("True",),
         "entry[0] < below and": ("",),
+        "one not in seen and": ("",),
+        "np.where(t, thinner, 0.0)": ("t",),
+        "(held >= 0 and asking[held].any())": ("False",),
     },
     "harness/shimming/study.py": {
         "force_error_per_mm(scene) * answer.bound_mm": ("-1e-3",),
         "if answer.bound_mm else 0.0": ("if False else -1.0",),
+        "at <= 0.5), mask": ("at < 0.5), mask",),
+        "at >= 0.5)": ("at > 0.5)",),
+        'max(abs(fastener["force_N"])': ('max((fastener["force_N"])',),
+        "np.argsort(distances": ("np.argsort(-distances",),
     },
     "harness/shimming/gap_regions.py": {
         "<= limit_mm:\n                break": ("<= 3 * limit_mm:\n                break",),
         "among[over[among]]": ("among",),
         "2 * first - low": ("low",),
+        "max(range(len(regions)), key": ("min(range(len(regions)), key",),
     },
     "harness/shimming/each.py": {
         "count - kept <= most": ("True", "count - kept < most"),
+        "goal.failing(count, ALPHA)": ("goal.failing(count, 2 * ALPHA)",),
         "search.among(self.cases, 0)": ("search.among((0,), 0)",),
     },
     "problems/effects/shims.py": {
@@ -279,6 +288,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         ),
         "low + NUDGE, high - NUDGE": ("low - 1.0, high + 1.0",),
         "places - NUDGE": ("places",),
+        "np.roll(above, -1, axis=1)": ("np.roll(above, 1, axis=1)",),
         "(last - first) * self.along(places)": ("0.0 * places[:, 0]",),
     },
     "harness/placement/search.py": {
