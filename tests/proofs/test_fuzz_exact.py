@@ -1,6 +1,6 @@
 """Exact problems without end: no bound is below the true error, and nothing wrong is called solved.
 
-Some sixty load cases; RIVETBENCH_LONG=1 takes 50 000 load cases, RIVETBENCH_LONG=N takes N.
+Some forty load cases; RIVETBENCH_LONG=1 takes 50 000 load cases, RIVETBENCH_LONG=N takes N.
 """
 
 import signal
