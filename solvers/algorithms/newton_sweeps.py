@@ -224,6 +224,8 @@ class Sweeps:
         """
         at: Callable[[Mask], TrialSolution]
         if self.M is None:
+            if case.stalled:
+                self.sets.begin()  # a border on a set of almost dependent contacts has lost digits
             at = partial(self.sets.set, case.trial)
         else:
             case.factor = case.factor or OpenFactor(self.M)

@@ -62,6 +62,25 @@ def test_a_set_starts_from_any_point() -> None:
         np.testing.assert_allclose(trial.y, Q @ trial.lam - p, atol=1e-9)
 
 
+def test_a_border_that_has_lost_its_digits_gives_way_to_a_new_factor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on contacts that almost depend on one another: only the first answer of a factor is right."""
+    exact, random, used = ClosedFactor.solve, np.random.default_rng(7), list[ClosedFactor]()
+
+    def solve(self: ClosedFactor, C: np.ndarray, b: np.ndarray) -> np.ndarray:
+        u = exact(self, C, b)
+        if not any(self is one for one in used):
+            used.append(self)
+            return u
+        return u * random.uniform(0.1, 1.9, len(u))
+
+    monkeypatch.setattr(ClosedFactor, "solve", solve)
+    Q, p = definite(SIZE, 5, 1e3), 30 * random.standard_normal(SIZE)
+    sweeps = Sweeps(dual_alone(Q))
+    case = sweeps.solved(DualLoadCase(0 * p, -p, p), TOLERANCE)
+    assert sweeps.answer(case, TOLERANCE).status == "solved"
+    assert case.residual <= 1e-11
+
+
 @pytest.mark.parametrize("mean", [-3.0, -1.0, 0.0, 1.0, 3.0])
 @pytest.mark.parametrize("size", [40, 300])
 def test_where_q_does_not_decay_answers_are_exact_from_few_to_all_closed(size: int, mean: float) -> None:
