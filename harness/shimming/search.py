@@ -37,8 +37,8 @@ from problems.forms.assembly import Matrix
 from .study import ShimStudy
 
 AT_ONCE = 8  # plans estimated together
-WORST, NEAREST = 3, 6  # patches whose gap is to fall, and those near each whose shims change
-IDLE = 6  # steps of a walk in succession that do not lower G
+WORST, NEAREST = 3, 4  # patches whose gap is to fall, and those near each whose shims change
+IDLE = 4  # steps of a walk in succession that do not lower G
 ALL = inf, inf  # more than any cost
 
 
