@@ -106,7 +106,7 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
     force.legend()
     for axes in stress:
         axes.plot(table["stage"], table[STRESS], color=style.BLACK, marker="o")
-        axes.set(ylabel=f"largest {STRESS}", ylim=(0.0, None))
+        axes.set(ylabel=f"largest {STRESS}", ylim=(0.0, 1.1 * table[STRESS].max() or None))
     scale = rooted("gap, mm", "viridis", arrays["stage_gaps"])
     maps = []
     told = zip(table.to_dict("records"), record["stages"], arrays["stage_gaps"], strict=True)
