@@ -13,6 +13,8 @@ import pytest
 
 from harness.measurement import child_process, monitored_call
 
+LEAST_MIB = 8192
+
 
 class Forked:
     """The part of subprocess.Popen that a monitored call uses."""
@@ -60,7 +62,18 @@ def _become_child(env: dict[str, str], job: int, stdout: int, stderr: int, event
 
 
 def fork_measuring_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From here on, unless they need another interpreter."""
+    """From here on, unless they need another interpreter.
+
+    They hold what the process of the tests holds, which grows from test to test: a test whose limit on memory
+    is lower than `LEAST_MIB` starts them (mark `starts`).
+    """
+    limit = monitored_call.Monitored._exceeded
+
+    def exceeded(self: monitored_call.Monitored) -> Any:
+        assert self.memory_limit_mib >= LEAST_MIB, "a forked process holds the tests' memory: mark `starts`"
+        return limit(self)
+
+    monkeypatch.setattr(monitored_call.Monitored, "_exceeded", exceeded)
 
     def start(command: Sequence[str], **options: Any) -> Any:
         kind = Forked if command[0] == sys.executable else subprocess.Popen

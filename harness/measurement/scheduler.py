@@ -9,8 +9,9 @@ import platform
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
-from contextlib import contextmanager, suppress
+from concurrent.futures import CancelledError, Executor, Future
+from contextlib import ExitStack, contextmanager, suppress
+from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from rich.console import Console
@@ -45,28 +46,40 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
     except ImportError as error:
         allowed = "needs Dask: pip install 'rivetbench[distributed]'"
         raise InputError.one("--scheduler", "scheduler", scheduler, f"{allowed} ({error})") from error
-    if count := local_workers(scheduler):
-        environment = {name: value for name, value in config.get(ENVIRONMENT).items() if name != TRIM}
-        with config.set({ENVIRONMENT: environment}), _uninterrupted():
-            cluster = LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                memory_limit=None,
-                dashboard_address=":0",
-                silence_logs=logging.ERROR,
-            )
-        try:
-            with cluster, Client(cluster) as client, _silent_if_interrupted(client):
-                yield _connected(client, scheduler, console)
-        finally:
-            logging.disable(logging.NOTSET)
+    if client := _open_client(scheduler):
+        yield client.get_executor(pure=False, retries=RETRIES), len(client.nthreads())
         return
-    try:
-        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError.one("--scheduler", "scheduler", scheduler, f"does not answer: {error}") from error
-    with client:
+    with ExitStack() as stack:
+        stack.callback(logging.disable, logging.NOTSET)
+        if count := local_workers(scheduler):
+            environment = {name: value for name, value in config.get(ENVIRONMENT).items() if name != TRIM}
+            with config.set({ENVIRONMENT: environment}), _uninterrupted():
+                cluster = LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    memory_limit=None,
+                    dashboard_address=":0",
+                    silence_logs=logging.ERROR,
+                )
+            client = stack.enter_context(Client(stack.enter_context(cluster)))
+        else:
+            try:
+                client = stack.enter_context(Client(scheduler, timeout=CONNECT_TIMEOUT))
+            except (OSError, TimeoutError, ValueError) as error:
+                raise InputError.one(
+                    "--scheduler", "scheduler", scheduler, f"does not answer: {error}"
+                ) from error
+        stack.enter_context(_silent_if_interrupted(client, own_workers=count is not None))
         yield _connected(client, scheduler, console)
+
+
+def _open_client(scheduler: str) -> Any:
+    """The client of this process if it is that of this scheduler (`shared`), else None."""
+    from distributed import default_client
+
+    with suppress(ValueError):  # there is none
+        client = default_client()
+        return client if client.scheduler.address == scheduler else None
 
 
 @contextmanager
@@ -95,15 +108,16 @@ def _uninterrupted() -> Iterator[None]:
 
 
 @contextmanager
-def _silent_if_interrupted(client: Any) -> Iterator[None]:
+def _silent_if_interrupted(client: Any, own_workers: bool) -> Iterator[None]:
     """Silence Dask after an interrupt: it would log each task that was cut off, also after its end."""
     try:
         yield
     except KeyboardInterrupt:
         logging.disable()
         logging.getLogger("tornado.application").addFilter(_is_of_an_open_connection)
-        with suppress(OSError):  # they have ended
-            client.run(logging.disable, on_error="ignore")
+        if own_workers:
+            with suppress(OSError):  # they have ended
+                client.run(logging.disable, on_error="ignore")
         raise
 
 
@@ -177,18 +191,19 @@ def done_as_completed(
     """
     remaining = iter(tasks)
     running: dict[Future[R], T] = {}
+    ended: SimpleQueue[Future[R]] = SimpleQueue()  # Ctrl-C within `wait` would leave futures locked
     while True:
         for task, sent in remaining:
-            running[executor.submit(work, sent)] = task
+            future = executor.submit(work, sent)
+            running[future] = task
+            future.add_done_callback(ended.put)
             if len(running) >= TASKS_PER_WORKER * count:
                 break
         if not running:
             return
-        ended = wait(running, return_when=FIRST_COMPLETED).done
-        while ended:
-            future = ended.pop()
-            task = running.pop(future)
-            raised = CancelledError() if future.cancelled() else future.exception()
-            outcome = future.result() if raised is None else raised
-            del future  # a future that is kept is computed again if its worker is lost
-            yield task, outcome
+        future = ended.get()
+        task = running.pop(future)
+        raised = CancelledError() if future.cancelled() else future.exception()
+        outcome = future.result() if raised is None else raised
+        del future  # a future that is kept is computed again if its worker is lost
+        yield task, outcome

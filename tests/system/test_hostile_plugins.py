@@ -35,6 +35,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
         ("held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(60)", "more than 700 MiB"),
     ],
 )
+@pytest.mark.starts
 @pytest.mark.usefixtures("own_cache")
 def test_check_says_how_a_solver_ended_or_that_it_did_not(tmp_path: Path, in_solve: str, said: str) -> None:
     limits = ("--time-limit", 1 if "took" in said else 20, "--memory-limit", 700)
@@ -71,7 +72,7 @@ def test_an_endless_import_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(InputError, match="took more than 1 s"):
         describe(read_suite(str(suite)))
     with pytest.raises(InputError, match="took more than 1 s"):
-        isolated.check("mine", plugin, 20, 1000)
+        isolated.check("mine", plugin, 20, 8192)
 
 
 FORK = "os.fork() or (os.setsid(), time.sleep(60))"  # the first time that a solver solves

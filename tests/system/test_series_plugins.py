@@ -43,6 +43,7 @@ def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[ob
         ("os.remove(problem.Q.filename)", "failed", "the solver wrote into the cache"),
     ],
 )
+@pytest.mark.starts
 def test_the_case_that_ends_the_process_is_a_row(tmp_path: Path, fault: str, status: str, said: str) -> None:
     limits = ("--time-limit", 20, "--memory-limit", 700)
     going = [*series(tmp_path, in_solve=COUNTED + fault), *limits]
