@@ -151,10 +151,10 @@ class GivenModel:
         from problems.input import user_matrices  # slow to import
 
         if isinstance(scene := self.scene, ManufacturedScene):
-            given = scene.sparse and sum(scene.block_sizes) > user_matrices.SMALL
+            large_sparse = scene.sparse and sum(scene.block_sizes) > user_matrices.SMALL
         else:
-            given = user_matrices.holds_sparse(dict(scene.files))
-        return self._read(sparse=True)[0] if given else None
+            large_sparse = user_matrices.holds_sparse(dict(scene.files))
+        return self._read(sparse=True)[0] if large_sparse else None
 
     @property
     def dependent(self) -> bool:

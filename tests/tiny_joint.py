@@ -74,6 +74,7 @@ FAULTS = {
     "big_details": "answer = Answer('solved', answer.lam, details={'trace': 'x' * 2**22})",
     "nan": "answer.lam.fill(np.nan)",
     "says": "print('one'); ctypes.CDLL(None).puts(b'two'); os.kill(os.getpid(), signal.SIGKILL)",
+    "names_a_file": "print(sys.modules['solvers.base'].__file__, file=sys.stderr, flush=True)",
     "gives_up": "answer = Answer('iteration_limit', None, iterations=5)",
 }
 

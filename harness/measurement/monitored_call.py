@@ -172,11 +172,11 @@ class Monitored:
     def log(self) -> str:
         """What it printed on stdout and stderr, in the order in which it came, as far as that is kept."""
         cut = f"\n[{self.log_cut} bytes left out]\n".encode() if self.log_cut else b""
-        return (self.log_start + cut + self.log_rest).decode(errors="replace")
+        return _text(self.log_start + cut + self.log_rest)
 
     @property
     def stderr_text(self) -> str | None:
-        return self.stderr.decode(errors="replace").strip() or None
+        return _text(self.stderr).strip() or None
 
     def _exceeded(self) -> Row | None:
         """The end of a process that exceeds a limit."""
@@ -236,6 +236,11 @@ class Monitored:
             if stream is not None:
                 with contextlib.suppress(BrokenPipeError):  # it died before it read its job
                     stream.close()
+
+
+def _text(printed: bytes) -> str:
+    """What was printed; files of this project by their paths within it, which are the same everywhere."""
+    return printed.decode(errors="replace").replace(f"{ROOT}{os.sep}", "")
 
 
 def _end(status: str, message: str) -> Row:

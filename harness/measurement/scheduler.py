@@ -47,10 +47,10 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
         allowed = "needs Dask: pip install 'rivetbench[distributed]'"
         raise InputError.one("--scheduler", "scheduler", scheduler, f"{allowed} ({error})") from error
     if client := _open_client(scheduler):
-        yield client.get_executor(pure=False, retries=RETRIES), len(client.nthreads())
+        yield _connected(client, scheduler, console)
         return
     with ExitStack() as stack:
-        stack.callback(logging.disable, logging.NOTSET)
+        stack.callback(logging.disable, logging.root.manager.disable)
         if count := local_workers(scheduler):
             environment = {name: value for name, value in config.get(ENVIRONMENT).items() if name != TRIM}
             with config.set({ENVIRONMENT: environment}), _uninterrupted():

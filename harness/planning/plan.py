@@ -193,11 +193,11 @@ def round_beside(m: Measurement, time: str) -> list[Measurement]:
     """The suite's entries with `beside` on m's scene, to be measured in a round that begins at a time."""
     scene = read_scene(m.source)
     entries = (e for e in m.suite.solver if e.beside and _applies(e, scene.name, m.source))
-    of_scene = (each for e in entries for each in _of_entry(m.suite, e, scene, m.source))
+    of_scene = (measurement for e in entries for measurement in _of_entry(m.suite, e, scene, m.source))
     return [
-        replace(each, round=time)
-        for each in of_scene
-        if each.repeat < ROUND_REPEATS and each.iteration_limit is None
+        replace(measurement, round=time)
+        for measurement in of_scene
+        if measurement.repeat < ROUND_REPEATS and measurement.iteration_limit is None
     ]
 
 

@@ -31,9 +31,11 @@ from problems.input.bounded_types import (
     PLAIN,
     VALUE,
     WORD,
+    Count,
     Finite,
     Positive,
     Seed,
+    Truth,
     is_word,
     resolved,
     unknown,
@@ -86,11 +88,11 @@ class SolverEntry(BaseModel):
     tolerances: Tolerances | None = None
     scenes: Annotated[list[str], NonEmpty] | None = None
     repeats: Repeats | None = None
-    threads: Annotated[list[PositiveInt], NonEmpty] | None = None
+    threads: Annotated[list[Count], NonEmpty] | None = None
     cases: Cases | None = None
-    batched: PositiveInt | None = None
-    gated: bool = True
-    beside: bool = False
+    batched: Count | None = None
+    gated: Truth = True
+    beside: Truth = False
     time_limit_s: Positive | None = None
     requirements: Annotated[list[Requirement] | None, NonEmpty, Field(alias="with")] = None
 
@@ -119,7 +121,7 @@ class RandomCases(BaseModel):
     mean: Finite | None = None
     sd: Positive | None = None
     correlation_length: Positive | None = None
-    fasteners: Annotated[bool, Field(exclude_if=lambda moved: not moved)] = False
+    fasteners: Annotated[Truth, Field(exclude_if=lambda moved: not moved)] = False
 
 
 class Suite(BaseModel):
@@ -141,15 +143,15 @@ class Suite(BaseModel):
     scenes: Annotated[list[str], NonEmpty]
     tolerances: Tolerances = [1e-9]
     repeats: Repeats = 1
-    threads: Annotated[list[PositiveInt], NonEmpty] = [2]
+    threads: Annotated[list[Count], NonEmpty] = [2]
     time_limit_s: Positive = 60.0
     time_limit_by_size_s: dict[PositiveInt, Positive] = {}
     times_best_form: Annotated[float, Field(ge=1), PLAIN] | None = None
-    memory_limit_mib: PositiveInt = 8192
+    memory_limit_mib: Count = 8192
     reference_limit_s: Positive | None = None
     limit_mm: Positive = 1e-7
-    yardstick: bool = False
-    trace: bool = False
+    yardstick: Truth = False
+    trace: Truth = False
     plugin: str | None = None
     series: RandomCases | None = None
     solver: Annotated[list[SolverEntry], NonEmpty]

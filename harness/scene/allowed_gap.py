@@ -138,10 +138,10 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
         sure += f"; the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
     kind, said = "" if result.undecided or not answered else "pass", [f"{sure}."]
     if result.undecided:
-        known = f"gaps are proven only to {result.uncertainty_mm:.1e} mm"
+        precision = f"gaps are proven only to {result.uncertainty_mm:.1e} mm"
         said.append(
             f"In {result.undecided} of {cases} it cannot be told whether a gap is larger than {allowed_mm:g} "
-            f"mm: {known}."
+            f"mm: {precision}."
         )
     if exceed:
         kind, worst, often = "fail", result.cases.iloc[0], int(np.argmax(result.shares))

@@ -73,11 +73,11 @@ def solve_into(
     console.print(f"{record['grid']['said']}.")
     if stressed:
         with reporter.step("stresses"):
-            found = stress.stresses(solution)
+            assembly_stress = stress.stresses(solution)
             for stage, line in zip(solution.stages, record.get("stages", ()), strict=True):
                 line["largest_stress"] = stress.largest_of(stage.scene, stage.x)
-        arrays |= found.arrays
-        record["stress"] = stress.stress_record(found, mesh, allow_stress)
+        arrays |= assembly_stress.arrays
+        record["stress"] = stress.stress_record(assembly_stress, mesh, allow_stress)
     verdicts = [record["verdict"], *(stage.judgement.verdict for stage in solution.stages)]
     code = DONE if set(verdicts) == {"within"} else FAILED
     if allow_gap_mm is not None:

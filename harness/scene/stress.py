@@ -90,12 +90,12 @@ class Stresses:
         return None if any((value + e > allowed).any() for value, e in told) else False
 
 
-def stress_record(found: Stresses, mesh: MeshError | None, allowed: float | None) -> dict[str, Any]:
+def stress_record(assembly_stress: Stresses, mesh: MeshError | None, allowed: float | None) -> dict[str, Any]:
     """The entry `stress` of solution.json: the largest von Mises stress, and a sentence with a verdict.
 
     kind : "pass", "fail", or "" without a limit or if it cannot be told.
     """
-    largest = found.largest
+    largest = assembly_stress.largest
     if not largest:
         untold = {} if allowed is None else {"allowed": allowed, "exceeded": None}
         return untold | {"kind": "", "said": "Forces at points act near all elements: no stress is told"}
@@ -105,12 +105,12 @@ def stress_record(found: Stresses, mesh: MeshError | None, allowed: float | None
     )
     grid = None if mesh is None else mesh.stress
     said += ", mesh error not known" if grid is None else f", mesh error about {grid:.1g} N/mm²"
-    if none := [part.part for part in found.parts if not len(part.places)]:
+    if none := [part.part for part in assembly_stress.parts if not len(part.places)]:
         said += f", none known of {', '.join(none)}"
     record: dict[str, Any] = {"largest": largest, "mesh_error": grid, "kind": ""}
     if allowed is None:
         return record | {"said": said[0].upper() + said[1:]}
-    exceeded = found.exceeded(allowed)
+    exceeded = assembly_stress.exceeded(allowed)
     if grid is not None and abs(largest["von_mises"] - allowed) <= grid:
         said += ", closer to the limit than the mesh can tell"
     kind = {None: "", True: "fail", False: "pass"}[exceeded]

@@ -44,7 +44,7 @@ def derivatives(job: Job) -> dict[str, list[Any]]:
     closed, dlam = A[:, C], np.zeros((C.sum(), len(means)))
     if C.any():
         Q, b = K.compliance(closed), closed.T @ free - dg[C]
-        dlam = linalg.lstsq(Q, b)[0] if data.assembly.dependent else linalg.solve(Q, b, assume_a="pos")
+        dlam = linalg.lstsq(Q, b)[0] if data.assembly.dependent else linalg.cho_solve(linalg.cho_factor(Q), b)
     dy, y = (dg - A.T @ (free - K.solve(closed @ dlam)))[~C], (load.g - A.T @ answer.x)[~C]
     dy = np.where(abs(dy) > ROUNDING * abs(dy).max(axis=0, initial=0.0), dy, 0.0)
     largest = dy[y.argmax()] if len(y) else np.zeros(len(means))

@@ -147,10 +147,12 @@ def read_labelled(path: Path, choose: Choose = list) -> Read:
 def format_of(path: Path) -> Format:
     """The format of a file by its suffix and, if that is ambiguous, its content. Raises InputError."""
     suffix = Path(path.name.lower().removesuffix(".gz")).suffix
-    for each in FORMATS.values():
-        if suffix in each.suffixes and each.accepts(path):
-            return each
-    allowed = ", ".join(dict.fromkeys(known for each in FORMATS.values() for known in each.suffixes))
+    for file_format in FORMATS.values():
+        if suffix in file_format.suffixes and file_format.accepts(path):
+            return file_format
+    allowed = ", ".join(
+        dict.fromkeys(known for file_format in FORMATS.values() for known in file_format.suffixes)
+    )
     raise InputError.one(path, "suffix", path.suffix, allowed)
 
 

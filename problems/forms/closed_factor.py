@@ -7,6 +7,7 @@ With Q_BB = UᵀU, the contacts E that have entered since and D that have left a
     [ I_DB    0     0   ] [  μ  ]   [  0  ]                                     [  0    0 ]
 
 whose last row is u_D = 0. A border of k columns takes 2k|B|² operations where a new factor takes |C|³/3.
+How many digits are left is for its user to tell, from y; a set whose S is singular is factored anew.
 """
 
 import numpy as np
@@ -35,7 +36,10 @@ class ClosedFactor:
             at, entered = np.searchsorted(self.changed, changed), C[changed]
             W, X = self.W[:, at], self.X[:, at]
             S = np.where(np.outer(entered, entered), self.Q[np.ix_(changed, changed)], 0.0) - W.T @ X
-            e = sla.solve(S, np.where(entered, b[changed], 0.0) - W.T @ v, check_finite=False)
+            *_, e, singular = sla.lapack.dgesv(S, np.where(entered, b[changed], 0.0) - W.T @ v)
+            if singular:
+                self.B = None
+                return self.solve(C, b)
             v -= X @ e
             u[changed] = e
         u[self.rows] = v

@@ -31,12 +31,12 @@ class SprungStiffness:
         self.entries[np.searchsorted(places, K.col.astype(np.int64) * n + K.row)] = K.data
         A = sp.csc_array(A)
         counts = np.diff(A.indptr)
-        own = np.repeat(np.arange(A.nnz), np.repeat(counts, counts))  # each entry with all of its column
+        entry = np.repeat(np.arange(A.nnz), np.repeat(counts, counts))  # each entry with all of its column
         contact = np.repeat(np.arange(A.shape[1]), counts**2)
-        other = np.arange(len(own)) - np.repeat(np.cumsum(counts**2) - counts**2, counts**2)
+        other = np.arange(len(entry)) - np.repeat(np.cumsum(counts**2) - counts**2, counts**2)
         other = A.indptr[contact] + other % counts[contact]
-        place = np.searchsorted(places, A.indices[own].astype(np.int64) * n + A.indices[other])
-        products = A.data[own] * A.data[other]
+        place = np.searchsorted(places, A.indices[entry].astype(np.int64) * n + A.indices[other])
+        products = A.data[entry] * A.data[other]
         self.G = sp.csr_array((products, (place, contact)), shape=(pattern.nnz, A.shape[1]))
 
     def factor(self, rho: Vector) -> Callable[[Matrix], Matrix]:

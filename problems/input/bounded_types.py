@@ -31,6 +31,10 @@ PLAIN = BeforeValidator(_no_other)
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False), PLAIN]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False), PLAIN]
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False), PLAIN]
+#: A number of things, at least one.
+Count = Annotated[int, Field(ge=1), PLAIN]
+#: true or false; no word or number that stands for it.
+Truth = Annotated[bool, Field(strict=True)]
 
 
 def _ascending(ends: tuple[float, float]) -> tuple[float, float]:

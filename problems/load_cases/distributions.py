@@ -28,12 +28,12 @@ def distribution(text: str) -> Any:
             raise ValueError("a parameter twice")
     except (SyntaxError, ValueError, TypeError, AttributeError, RecursionError, MemoryError) as error:
         raise ValueError(SYNTAX) from error
-    known = {key: value for key, value in vars(stats).items() if isinstance(value, stats.rv_continuous)}
-    if name not in known:
-        raise ValueError(unknown("distribution", name, sorted(known)))
-    order = ", ".join([*filter(None, [known[name].shapes]), "loc=0", "scale=1"])
+    continuous = {key: value for key, value in vars(stats).items() if isinstance(value, stats.rv_continuous)}
+    if name not in continuous:
+        raise ValueError(unknown("distribution", name, sorted(continuous)))
+    order = ", ".join([*filter(None, [continuous[name].shapes]), "loc=0", "scale=1"])
     try:
-        frozen = known[name](*values, **named)
+        frozen = continuous[name](*values, **named)
         if not np.isfinite(values_at(frozen, np.array([0.0, 0.5, 1.0]))).all():
             raise TypeError(order)
     except Exception as error:  # scipy raises kinds of its own

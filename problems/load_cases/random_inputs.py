@@ -214,7 +214,7 @@ def inputs_of(
     for law in laws:
         name, text = (part.strip() for part in law.partition("=")[::2])
         source = f"scene {scene.name}: [random]" if law in scene.random else "--random"
-        each, levels, bare = cast(re.Match[str], LAW.fullmatch(text)).groups()
+        per_element, levels, bare = cast(re.Match[str], LAW.fullmatch(text)).groups()
         key, where = keys.get(name), f"{source} {name}"
         if key is None or name in [one.name for one in inputs]:
             allowed = "one distribution of each key" if key else allowed_keys(keys)
@@ -225,10 +225,10 @@ def inputs_of(
             faults.append(Fault(where, "distribution", text, str(error)))
             continue
         if key:
-            elements = scene.effects[key.effect].element_count(scene.joint) if each else 0
+            elements = scene.effects[key.effect].element_count(scene.joint) if per_element else 0
             how = text, frozen, elements, int(levels or 0), name not in loads
             inputs.append(one := Input(key.name, key.effect, key.path, *how))
-            if each and not elements:
+            if per_element and not elements:
                 faults.append(Fault(where, "each", text, "left out: it has no elements at points"))
             if key.path == ("approach",) and key.effect in fresh:
                 faults.append(Fault(where, "key", name, LOCKED))

@@ -36,7 +36,7 @@ class Numbering:
             numbers_of_lines = [_mesh_lines(models[part], own) for part, own in zip(block, free, strict=True)]
             x, y = (np.concatenate(numbers) for numbers in zip(*numbers_of_lines, strict=True))
             line, across = (x, y) if _widest(x) <= _widest(y) else (y, x)
-            owner = np.repeat(np.arange(len(block)), [own.size for own in free])
+            owner = np.repeat(np.arange(len(block)), [numbers.size for numbers in free])
             rank = np.empty(len(line), dtype=np.intp)
             rank[np.lexsort((np.arange(len(line)), across, owner, line))] = np.arange(len(line))
             for k, part in enumerate(block):

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.bounded_types import PLAIN, Finite, NotNegative
+from problems.input.bounded_types import PLAIN, Finite, NotNegative, Truth
 from problems.input.scan_points import crowded
 
 from .effect import ContactEffect, Effect, ForceEffect, SpringEffect
@@ -28,7 +28,7 @@ class Pattern(Table):
     columns: Annotated[int, Field(ge=1, le=10_000), PLAIN]
     rows: Annotated[int, Field(ge=1, le=10_000), PLAIN]
     edge: Annotated[NotNegative, "mm"] = 0.0
-    on_nodes: bool = False
+    on_nodes: Truth = False
 
     @model_validator(mode="after")
     def _not_too_many(self) -> "Pattern":

@@ -10,6 +10,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.input.bounded_types import Truth
 from problems.storage import digest
 
 from .effect import Effect, StiffnessEffect
@@ -23,7 +24,7 @@ E = TypeVar("E", bound=Effect)
 class Output(Table):
     """The table [output]: what an answer has besides displacements, gaps and forces."""
 
-    stress: bool = False
+    stress: Truth = False
 
 
 GAPS_ALONE = Output()

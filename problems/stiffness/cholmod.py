@@ -25,10 +25,10 @@ class Cholmod:
         self.D = balanced_units(K.diagonal())
         lower = sp.tril(scaled(K, self.D, self.D), format="coo")
         places = (matrix(index.astype(np.int64)) for index in (lower.row, lower.col))
-        given = spmatrix(matrix(lower.data), *places, K.shape)
-        self.L = cholmod.symbolic(given)
+        triangle = spmatrix(matrix(lower.data), *places, K.shape)
+        self.L = cholmod.symbolic(triangle)
         try:
-            cholmod.numeric(given, self.L)
+            cholmod.numeric(triangle, self.L)
         except ArithmeticError as error:
             raise np.linalg.LinAlgError("a pivot is not positive") from error
         # The diagonal of DKD is about 1, whatever the order of its unknowns.

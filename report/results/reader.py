@@ -88,11 +88,11 @@ class Results:
         one by one, or "all"; only these have the runs that a trace stopped, "whole" has all others.
         """
         names, traced = self.rows["scene"].str, self.rows["iteration_limit"].notna()
-        own = {"ladders": names.startswith(LADDERS), "drawn": names.startswith((DRAWN, SPARSE))}
-        own = {name: rows & ~traced for name, rows in own.items()} | {"whole": ~traced}
-        many = own["drawn"] & (self.rows.loc[own["drawn"], "scene"].nunique() > MOST_SHOWN)
-        others = ~(own["ladders"] | many | traced)
-        rows = self.rows if what == "all" else self.rows[own.get(what, others)].reset_index(drop=True)
+        masks = {"ladders": names.startswith(LADDERS), "drawn": names.startswith((DRAWN, SPARSE))}
+        masks = {name: rows & ~traced for name, rows in masks.items()} | {"whole": ~traced}
+        many = masks["drawn"] & (self.rows.loc[masks["drawn"], "scene"].nunique() > MOST_SHOWN)
+        others = ~(masks["ladders"] | many | traced)
+        rows = self.rows if what == "all" else self.rows[masks.get(what, others)].reset_index(drop=True)
         return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 
     def by_machine(self) -> list["Results"]:

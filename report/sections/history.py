@@ -55,14 +55,14 @@ def _lines(cells: pd.DataFrame, rounds: pd.DataFrame) -> pd.DataFrame:
     for _, of_solver in best.reset_index().groupby("solver"):
         versions = of_solver.groupby(POINT).ngroups
         common = of_solver[of_solver.groupby("scene")["scene"].transform("size") == versions]
-        for (solver, version, _), own in common.groupby(POINT) if versions > 1 else ():
+        for (solver, version, _), rows in common.groupby(POINT) if versions > 1 else ():
             line = {
                 "solver": solver,
                 "solver_version": version,
-                "measured": own["recorded_at"].max()[:MINUTE],
+                "measured": rows["recorded_at"].max()[:MINUTE],
             }
-            line |= {"scenes": len(own), "within": own["seconds"].count()}
-            lines.append(line | {"seconds": own["seconds"].median(), "times": own["times"].median()})
+            line |= {"scenes": len(rows), "within": rows["seconds"].count()}
+            lines.append(line | {"seconds": rows["seconds"].median(), "times": rows["times"].median()})
     return pd.DataFrame(lines).sort_values(["solver", "measured"]) if lines else pd.DataFrame()
 
 
@@ -73,8 +73,8 @@ def _drawing(lines: pd.DataFrame) -> Drawing:
     }
     drawing = style.figure_above(3.0, style.legend_entries(styles))
     axes = drawing.subplots()
-    for solver, own in lines.groupby("solver"):
-        axes.plot(pd.to_datetime(own["measured"]), own["times"], **styles[str(solver)])
+    for solver, rows in lines.groupby("solver"):
+        axes.plot(pd.to_datetime(rows["measured"]), rows["times"], **styles[str(solver)])
     axes.set(yscale="log", ylabel="× textbook")
     style.plain_log(axes.yaxis)
     return drawing

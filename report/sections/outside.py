@@ -55,10 +55,10 @@ def _refined(best: pd.DataFrame) -> Table | None:
     before = lines.groupby("problem")[["cells", "objective"]].shift()
     change, halved = lines["objective"] - before["objective"], lines["cells"] == 2 * before["cells"]
     ratio = change.shift() / change.where(change != 0)
-    known = halved & halved.shift(fill_value=False) & (ratio > 0)
+    comparable = halved & halved.shift(fill_value=False) & (ratio > 0)
     lines = lines[["problem", "cells", "n", "active", "objective"]].assign(
         change=change,
-        order=np.log2(ratio.where(known)),
+        order=np.log2(ratio.where(comparable)),
         seconds=[seconds_text(cell) for cell in records(lines)],
     )
     columns = [

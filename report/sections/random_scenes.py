@@ -39,17 +39,17 @@ def section(results: Results) -> Section | None:
     seconds = (cells["setup_s"].fillna(0.0) + cells["solve_s"]).where(cells["verdict"].isin(ANSWERED))
     good = (cells["status"] == "solved") & (cells["verdict"] == "within")
     cells = best_tolerances(cells.assign(load_case_s=seconds, good=good))
-    own = cells["scene"].str.startswith(SUPERELEMENTS)
+    superelements = cells["scene"].str.startswith(SUPERELEMENTS)
     blocks: list[Block] = []
-    if len(sized := cells[~own]):
+    if len(sized := cells[~superelements]):
         run, often = sized[sized["status"] != "not_run"], shown(sized)
         if len(often):
             blocks.append(_figure(often, ", of the methods run on at least half of the scenes"))
         elif len(run):
             blocks.append(_figure(run))
         blocks.append(_times(sized, results.limit))
-    if own.any():
-        blocks.append(_to_textbook(cells[own], results.limit))
+    if superelements.any():
+        blocks.append(_to_textbook(cells[superelements], results.limit))
     if not cells["good"].all():
         blocks.append(_failures(cells[~cells["good"]]))
     return Section("Scenes drawn at random", blocks)

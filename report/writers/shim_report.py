@@ -51,10 +51,12 @@ def write(directory: Path) -> Path:
             patches = patches.join(used).fillna({"joints": 0, "thickness_mm": 0.0})
             heads = [number("joints with it", "joints", whole), number("thickest, mm", "thickness_mm")]
             label, what = "joints", f"in how many of {counted(len(joints), 'joint')}"
-            each = table.pivot(index="joint", columns="patch", values=sizes)
-            ends = [(patches["patch"][at[1]], ", other end" * (at[0] != sizes[0])) for at in each.columns]
-            each.columns = pd.Index(["".join(end) for end in ends])
-            files["joints"] = pd.DataFrame(joints).join(each, on="joint")
+            thicknesses = table.pivot(index="joint", columns="patch", values=sizes)
+            ends = [
+                (patches["patch"][at[1]], ", other end" * (at[0] != sizes[0])) for at in thicknesses.columns
+            ]
+            thicknesses.columns = pd.Index(["".join(end) for end in ends])
+            files["joints"] = pd.DataFrame(joints).join(thicknesses, on="joint")
             blocks += _stock(table.join(patches["area_mm2"], on="patch"), sizes)
         shims = patches[patches["thickness_mm"] > 0]
         ranges = [Column(f"{axis}, mm", partial(_range, axis)) for axis in "xy"]

@@ -124,11 +124,11 @@ class ContactSprings:
         for _ in range(STEPS):
             if size <= enough:
                 break
-            given = At @ inverse(A @ step)
-            if (curvature := float(step @ given)) * rho <= EPS * float(step @ step):
+            Q_step = At @ inverse(A @ step)
+            if (curvature := float(step @ Q_step)) * rho <= EPS * float(step @ step):
                 break  # closed contacts that depend on one another: no λ gives the rest
             alpha = size / curvature
-            change, closed = change + alpha * step, closed - alpha * given
+            change, closed = change + alpha * step, closed - alpha * Q_step
             r, last = np.where(C, closed - y, 0.0), size
             size = float(r @ r)
             step = r + size / last * step

@@ -159,6 +159,13 @@ def test_what_a_solver_printed_survives_its_end(folder: Path) -> None:
     assert (row["status"], row["printed"]) == ("crashed", "one\ntwo\n")
 
 
+def test_a_file_of_the_project_is_told_by_its_path_within_it(folder: Path) -> None:
+    """Logs and rows of two machines are the same, wherever it is installed."""
+    row = outcome(folder, "names_a_file")
+    assert row["stderr"] == "solvers/base.py"
+    assert row["printed"] == "solvers/base.py\n"
+
+
 @starts
 def test_floods_of_output_are_dropped_but_for_a_tail(folder: Path) -> None:
     row = outcome(folder, "chatter")

@@ -249,6 +249,15 @@ def test_a_version_is_exact(tmp_path: Path, requirement: str) -> None:
         read_suite(str(tiny_joint.write_suite(tmp_path, TWO + f'with = ["{requirement}"]\n')))
 
 
+def test_only_true_and_false_are_truth_values(tmp_path: Path) -> None:
+    text = TWO.replace("gated = false", "gated = 1")
+    path = tiny_joint.write_suite(tmp_path, text, trace="yes", threads=[True])
+    with pytest.raises(
+        InputError, match=r"(?s)threads\.0.*number.*trace.*boolean.*solver\.1\.gated.*boolean"
+    ):
+        read_suite(str(path))
+
+
 def test_versions_that_could_not_be_told_apart_are_refused(tmp_path: Path) -> None:
     other = '[[solver]]\nname = "piqp"\nvariant = "plain 0.6.2"\n'
     with pytest.raises(InputError, match="other `with` under this variant"):

@@ -74,6 +74,11 @@ ALONE = [
         "pattern.columns",
         "a valid n",
     ),
+    (
+        'kind = "fasteners"\npreload = 5\npattern = { columns = 9, rows = 1, on_nodes = "no" }',
+        "pattern.on_nodes",
+        "a valid boolean",
+    ),
     ('kind = "stringers"\npart = "a"\npitch = 9\nstart = 40\nstop = 20\nI = 1', "start, stop", "0 … 90 mm"),
 ]
 

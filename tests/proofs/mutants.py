@@ -195,7 +195,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "problems/forms/sprung_stiffness.py": {
         "self.entries + self.G @ rho": ("self.entries",),
-        "A.data[own] * A.data[other]": ("A.data[own]",),
+        "A.data[entry] * A.data[other]": ("A.data[entry]",),
     },
     "harness/verification/assess.py": {
         "SAFE * near + ": ("",),

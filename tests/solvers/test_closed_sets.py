@@ -50,6 +50,15 @@ def test_a_factor_follows_the_contact_set() -> None:
     assert 3 <= factored <= 13
 
 
+def test_a_border_of_one_contact_twice_is_refused_as_such_a_set_is() -> None:
+    Q, C = np.eye(20), np.arange(20) < 18
+    Q[18, 19] = Q[19, 18] = 1.0
+    factor = ClosedFactor(Q)
+    np.testing.assert_array_equal(factor.solve(C, np.ones(20)), C)
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        factor.solve(~C | C, np.ones(20))
+
+
 def test_a_set_starts_from_any_point() -> None:
     """λ is zero off the set and y on it, and y = Qλ − p, wherever λ was."""
     Q, random = definite(SIZE, 2), np.random.default_rng(3)
