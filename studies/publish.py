@@ -215,9 +215,7 @@ def write_index(folder: Path) -> Path:
         line |= {"measured": " to ".join(dict.fromkeys([*days[:1], *days[-1:]]))}
         line |= {"minutes": "–" if taken is None else f"{taken:.0f}", "commit": _commits(rows)}
         lines.append(line | {"rows": len(rows)} | {verdict: verdicts[verdict] for verdict in VERDICTS})
-    machines = sorted(
-        {str(row["machine"]) for rows in published.values() for row in rows if row.get("machine")}
-    )
+    machines = _machines([row for rows in published.values() for row in rows])
     text = (
         f"# Published results\n\nMeasured on {', '.join(machines)}. `python -m harness report DIRECTORY` "
         "draws the report of a suite from its rows.\n\n"
@@ -231,8 +229,8 @@ def write_index(folder: Path) -> Path:
 def _how_fast(folder: Path) -> str:
     """The table that README and the documents quote: of `speed`, and of series with proofs."""
     tables = [ours_and_others(read(folder / "speed"))] if rows_of(folder / "speed") else []
-    measured = [*rows_of(folder / "speed"), *rows_of(folder / "series")]
-    machines = sorted({str(row["machine"]) for row in measured if row.get("machine")})
+    machines = filter(None, (_machines(rows_of(folder / name)) for name in ("speed", "series")))
+    where = "; many load cases on ".join(dict.fromkeys(map(listed, machines)))
     if rows_of(folder / "series"):
         rows = read(folder / "series").rows
         proven = {SERIES[name][0]: _seconds(folder / name) for name in SERIES if rows_of(folder / name)}
@@ -240,7 +238,7 @@ def _how_fast(folder: Path) -> str:
     table = pd.concat([pd.DataFrame(), *tables])
     if table.empty:
         return ""
-    return f"\n## How fast is it?\n\n{how_fast_table(table).markdown}\n\nMeasured on {listed(machines)}.\n"
+    return f"\n## How fast is it?\n\n{how_fast_table(table).markdown}\n\nMeasured on {where}.\n"
 
 
 def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.DataFrame:
@@ -266,6 +264,10 @@ def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.
 def _seconds(series: Path) -> pd.Series[float]:
     """Of each case, the proof of its error included."""
     return pd.DataFrame(rows_of(series)).reindex(columns=["setup_s", "solve_s", "form_s"]).sum(axis=1)
+
+
+def _machines(rows: Rows) -> list[str]:
+    return sorted({str(row["machine"]) for row in rows if row.get("machine")})
 
 
 def _title(directory: Path) -> str:
