@@ -1,10 +1,12 @@
 """Errors that users can correct: each names the file, the key, the value and what is allowed."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 CONTROL = re.compile("[\0-\x1f\x7f]")
+In, Out = TypeVar("In"), TypeVar("Out")
 #: A hint for "parts\\top.npz" in a TOML file, which is a tab and op.npz.
 BACKSLASH = "; a backslash in TOML's double quotes begins an escape: write /, or single quotes"
 
@@ -60,3 +62,17 @@ class InputError(ValueError):
     @classmethod
     def one(cls, where: object, key: str, value: object, allowed: str) -> "InputError":
         return cls([Fault(str(where), key, value, allowed)])
+
+
+def read_all(read: Callable[[In], Out], inputs: Iterable[In]) -> list[Out]:
+    """The result of `read` for each input. Raises InputError with the faults of all."""
+    results: list[Out] = []
+    faults: list[Fault] = []
+    for one in inputs:
+        try:
+            results.append(read(one))
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    return results

@@ -2,9 +2,10 @@
 
 Takes hours; Ctrl-C stops it, and the same command goes on. A suite is measured in results/publishing/COMMIT.
 It takes its place in results/published when it is whole: the run ended well, and every row is of this commit,
-without changes. What has such rows already is not measured again. A published row that was measured beside a
-round of ours (`beside` in suite.py) stays while its scene, its solver and that one's version and code are the
-same. At the end, and alone with --index, the index is written anew.
+without changes. What has such rows already is not measured again. A row that was measured beside a round of
+ours (`beside` in suite.py), published or of an interrupted run of another commit, stays while its scene, its
+solver and that one's version and code are the same. At the end, and alone with --index, the index is written
+anew.
 """
 
 from __future__ import annotations
@@ -58,9 +59,9 @@ NAMES = (
     *("hard", "hard-full", "drawn", "hard-sparse", "outside", "paper", "accuracy"),
 )
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
-#: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this; its
-#: logs, too.
+#: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.
 KEPT_KIB = 3800
+WITH_LOGS = ("default", "speed")  # the suites whose solvers' logs are published
 COLOURS = 256
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
@@ -121,15 +122,25 @@ def measure(names: Sequence[str], digits: str) -> list[str]:
 
 
 def begin(name: str, directory: Path) -> None:
-    """Put the published rows in rounds into a directory, where `run` sets aside what has changed since."""
-    published = PUBLISHED / name
-    rows = [dict(row) for row in rows_of(published) if in_rounds(row)]
+    """Put the newest rows in rounds, with their logs, into a directory, where `run` sets aside what has
+    changed since. They are the published ones, or of an interrupted run, which began with the published ones.
+    """
+    source = max((PUBLISHED / name, *STAGED.glob(f"*/{name}")), key=_newest)
+    rows = [dict(row) for row in rows_of(source) if in_rounds(row)]
     planned = {m.key for m in expand(read_suite(name))} if rows else set()
     if kept := [row for row in rows if row["key"].partition(ROUND)[0] in planned]:
-        directory.mkdir(parents=True)
+        (directory / "logs").mkdir(parents=True)
         records.rewrite(directory / records.MEASUREMENTS, kept)
-        for path in [*published.glob("machine*.json"), *published.glob(records.OUTDATED)]:
+        for path in [*source.glob("machine*.json"), *source.glob(records.OUTDATED)]:
             shutil.copy(path, directory)
+        for log in filter(None, (row.get("log") for row in kept)):
+            if (source / log).is_file():
+                shutil.copy(source / log, directory / log)
+
+
+def _newest(directory: Path) -> str:
+    """The time of its last row; "" without one."""
+    return max((str(row.get("recorded_at")) for row in rows_of(directory)), default="")
 
 
 def in_rounds(row: Mapping[str, Any]) -> bool:
@@ -193,12 +204,13 @@ def slim(picture: Path) -> None:
 
 
 def _unwanted(directory: Path) -> Iterator[Path]:
-    """What is not published: locks, the scenes' arrays, and answers or logs that are large."""
+    """What is not published: locks, the scenes' arrays, answers that are large, and logs of most suites."""
     yield from directory.glob("**/*.lock")
     yield from directory.glob("scenes")
-    for name in ("answers", "logs"):
-        if sum(path.stat().st_size for path in directory.glob(f"{name}/*")) > KEPT_KIB * 2**10:
-            yield directory / name
+    if directory.name not in WITH_LOGS:
+        yield from directory.glob("logs")
+    if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_KIB * 2**10:
+        yield directory / "answers"
 
 
 def write_index(folder: Path) -> Path:

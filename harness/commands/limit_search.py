@@ -23,7 +23,7 @@ import numpy as np
 from harness.measurement.scheduler import shared, threads_per_worker
 from harness.results import records, series_file
 from harness.results.atomic_output import refuse_inputs
-from harness.results.schema import SERIES
+from harness.results.records import TOLERANCE
 from harness.scene.allowed_gap import CONFIDENCE, SHARE, refuse_unusable, share_interval
 from harness.series.load_case_source import DEFAULT, GapCases
 from harness.series.session import SeriesOptions
@@ -38,7 +38,6 @@ from problems.scene_files import read_scene
 
 from .load_case_series import run_series
 
-RECORD = "tolerance.json"
 RESOLUTION = 0.01  # of the range, by default
 UNCHECKED = SeriesOptions(check=0)
 
@@ -138,7 +137,7 @@ def tolerance(
         allowed = "a share above 0, at most 1, a resolution from 1e-6 to 1, no --contributors"
         raise InputError.one("--find", "share, resolution", (share, resolution), allowed)
     refuse_unusable(allow_gap_mm)
-    refuse_inputs([directory / RECORD], read.sources)
+    refuse_inputs([directory / TOLERANCE], read.sources)
     key, grid = keys[name], np.linspace(low, high, ceil(1 / resolution - 1e-9) + 1)
     values = [float(f"{value:.10g}") for value in grid]
 
@@ -176,7 +175,7 @@ def tolerance(
         return count
 
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
-    with records.locked(directory, (), other=SERIES), shared(scheduler, console_of(reporter)) as address:
+    with records.locked(directory, TOLERANCE), shared(scheduler, console_of(reporter)) as address:
         first, last = (bounds(value, None) for value in (values[0], values[-1]))
         if np.array_equal(first, last):
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
@@ -198,7 +197,7 @@ def tolerance(
             value = values[(values.index(value) + values.index(safe) + rising) // 2]
         outcome = replace(outcome, sentences=tuple(said))
         asked = {"find": find, "allowed_mm": allow_gap_mm, "share": share, "cases": count}
-        records.replace_object(directory / RECORD, asked | asdict(outcome))
+        records.replace_object(directory / TOLERANCE, asked | asdict(outcome))
         from report.writers.tolerance_report import write  # slow to import: not before the first row
 
         write(directory, f"{name} in {read.name}", share, said, shares)

@@ -11,7 +11,7 @@ from harness.results import records
 from harness.results.comparison import Incomparable, read_side, refuse_incomparable
 from harness.results.row_validation import refuse_unreadable
 from harness.verification.reference_problem import PROBLEMS
-from problems.errors import InputError
+from problems.errors import InputError, read_all
 
 from .suite_runs import SUITE, report
 
@@ -21,7 +21,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
 
     Answers stay where they are. Raises InputError; Incomparable if a machine made a measurement in two runs.
     """
-    sides = [read_side(name) for name in names]
+    sides = read_all(read_side, names)
     for side in sides[1:]:
         refuse_incomparable(sides[0], side)
     for folder in map(Path, names):  # before anything is written
@@ -34,7 +34,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
         raise Incomparable.one(" ".join(names), "key", place[0], f"one row of {place[1]}, not {count}")
     if (out / records.MEASUREMENTS).exists():
         raise InputError.one("--out", "directory", str(out), f"has rows: {records.OTHER}")
-    with records.locked(out):
+    with records.locked(out, folders=("scenes",)):
         for folder, side in zip(map(Path, names), sides, strict=True):
             of_machine = {"machine": side.rows[0].get("machine")}
             for file in sorted(folder.glob("machine*.json")):

@@ -8,6 +8,7 @@ import pandas as pd
 from harness.results.atomic_output import refuse_unwritable
 from harness.results.comparison import Incomparable, Side, measurement, read_side, refuse_incomparable
 from harness.results.records import MEASUREMENTS
+from problems.errors import read_all
 from report.analysis.comparison import compared
 from report.document.escape import quoted
 from report.results.rows import frame
@@ -70,8 +71,8 @@ def compare(
     names = [str(new)] if isinstance(new, str | Path) else list(map(str, new))
     if out is not None:
         refuse_unwritable(Path(out), [Path(name) / MEASUREMENTS for name in (str(old), *names)])
-    base = read_side(str(old), key)
-    comparisons = [_compared(base, read_side(name, key), max_digits_lost, max_slowdown) for name in names]
+    base, *sides = read_all(lambda name: read_side(name, key), [str(old), *names])
+    comparisons = [_compared(base, side, max_digits_lost, max_slowdown) for side in sides]
     if out is not None:
         write(Path(out), comparisons)
     return comparisons

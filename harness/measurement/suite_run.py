@@ -53,7 +53,7 @@ def run(
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite) if key is None else of_key(expand(suite), key)
-    with records.locked(directory):
+    with records.locked(directory, folders=("answers", "scenes", "logs")):
         rows = resumed(directory, plan, solvers, console)
         records.replace_text(directory / "suite.toml", to_toml(suite))
         for scene in map(read_scene, suite.scenes):

@@ -14,8 +14,6 @@ from harness.results.records import to_line
 from problems.errors import InputError
 from problems.storage import digest
 
-PLANS = "plans.jsonl"
-
 
 def refuse_other_command(directory: Path, names: Iterable[str], journal: str) -> None:
     """Raise InputError if the directory has some of the names, but not the journal among them."""

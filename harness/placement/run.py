@@ -14,7 +14,7 @@ import pandas as pd
 
 from harness.measurement.scheduler import workers
 from harness.measurement.solver_descriptions import described
-from harness.placement.answer_journal import PLANS, AnswerJournal, refuse_other_command
+from harness.placement.answer_journal import AnswerJournal, refuse_other_command
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
 from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
 from harness.placement.search import Search
@@ -46,7 +46,7 @@ from problems.scene_files import read_scene, scene_of
 
 RECORD = "place.json"
 SERIES = ("own", "plan")
-OUTPUTS = (RECORD, PLANS, *(f"{name}.{kind}" for name in SERIES for kind in ("toml", "csv")))
+OUTPUTS = (RECORD, records.PLANS, *(f"{name}.{kind}" for name in SERIES for kind in ("toml", "csv")))
 HELD_BACK = "Every second row is held back: it does not choose the plan, but says what it keeps"
 
 
@@ -166,17 +166,17 @@ def place(
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
-    refuse_other_command(directory, (*OUTPUTS, *SERIES), PLANS)
+    refuse_other_command(directory, (*OUTPUTS, *SERIES), records.PLANS)
     if order.table:
         reporter.say(HELD_BACK)
     nodes = prepared(study.bare, form=form).assembly.contact_nodes
     assert nodes is not None  # of a joint
     console = console_of(reporter)
-    with records.locked(directory, (), other=records.MEASUREMENTS):
+    with records.locked(directory, records.PLANS):
         scene_of(tomllib.loads(current), str(directory / "own.toml"))  # as is refused at the end
         pool = workers(scheduler, console) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
-            journal = AnswerJournal(study, directory / PLANS, identity, executor)
+            journal = AnswerJournal(study, directory / records.PLANS, identity, executor)
             whole = journal, 0, 0, goal.limit_mm or 0.0
             search = Search(*whole, study.bare, nodes, holes, reporter=reporter)
             result = search_in_rounds(search, movable.current, goal, order)

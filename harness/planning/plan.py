@@ -11,7 +11,7 @@ from itertools import product
 from math import inf
 from typing import Any
 
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, read_all
 from problems.model.scene import Scene
 from problems.scene_files import read_scene
 from solvers.base import FORMS, Form
@@ -127,12 +127,7 @@ def expand(suite: Suite) -> list[Measurement]:
     """
     scenes: dict[str, Scene] = {}
     faults: list[Fault] = []
-    for source in suite.scenes:
-        try:
-            scene = read_scene(source)
-        except InputError as error:
-            faults += error.faults
-            continue
+    for source, scene in zip(suite.scenes, read_all(read_scene, suite.scenes), strict=True):
         if scene.name in (other.name for other in scenes.values()):
             allowed = f"another is called {scene.name} too; rename it"
             faults.append(Fault(suite.name, "scenes", source, allowed))

@@ -23,7 +23,9 @@ from .schema import SERIES
 
 Row = dict[str, Any]
 
-MEASUREMENTS = "measurements.jsonl"
+MEASUREMENTS, PLANS, SHIMS, TOLERANCE = "measurements.jsonl", "plans.jsonl", "shims.jsonl", "tolerance.json"
+#: The files with which the commands go on; a directory has one of them.
+JOURNALS = (MEASUREMENTS, SERIES, PLANS, SHIMS, TOLERANCE)
 OUTDATED = "measurements.outdated.jsonl"
 ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read
 OTHER = "name another directory with --out"
@@ -185,14 +187,12 @@ def refuse_other(path: Path, recorded: Row, identity: Row) -> None:
 
 
 @contextmanager
-def locked(
-    directory: Path, folders: Sequence[str] = ("answers", "scenes", "logs"), other: str = SERIES
-) -> Iterator[None]:
-    """Create the directory and lock it against a second run. Raises InputError if that fails, or if results
-    of the other kind are there: the file `other`.
+def locked(directory: Path, own: str = MEASUREMENTS, folders: Sequence[str] = ()) -> Iterator[None]:
+    """Create the directory and lock it against a second run. Raises InputError if that fails, or if it has
+    the journal of another command than the one whose journal is `own`.
     """
-    if (directory / other).exists():
-        allowed = f"has the {other} of another command: name another directory"
+    if there := [name for name in JOURNALS if name != own and (directory / name).exists()]:
+        allowed = f"has the {there[0]} of another command: name another directory"
         raise InputError.one("--out", "directory", str(directory), allowed)
     try:
         for folder in ("", *folders):

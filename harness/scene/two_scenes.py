@@ -16,6 +16,7 @@ from rich.text import Text
 from harness.results.comparison import Incomparable
 from harness.terminal import FAILED
 from problems.build import prepared
+from problems.errors import read_all
 from problems.forms.assembly import Matrix
 from problems.model.interface import extent
 from problems.model.scene import JointScene
@@ -61,7 +62,7 @@ def common_places(first: str, second: str) -> list[tuple[sp.csr_array, sp.csr_ar
     """The weights of the contacts of either scene at common places, pair by pair; None if contacts are the
     same. Raises Incomparable if pairs of parts differ, the corners of the junction by more than SHIFT, or A.
     """
-    one, other = read_scene(first), read_scene(second)
+    one, other = read_all(read_scene, (first, second))
     if isinstance(one, JointScene) and isinstance(other, JointScene):
         a, b = one.joint, other.joint
         places, others = ([joint.places(pair) for pair in joint.pairs] for joint in (a, b))

@@ -45,7 +45,7 @@ def run(
     Returns 0, 1 if an answer is outside the limit or missing, 3 if one could not be judged. Raises InputError
     if DIRECTORY holds another series; after KeyboardInterrupt the same command resumes.
     """
-    with records.locked(directory, (), other=records.MEASUREMENTS):
+    with records.locked(directory, SERIES):
         open_series(directory, identity(job) | facts, metadata(job))
         done = solved(directory, job.cases)
         remaining = sorted(np.flatnonzero(~done).tolist(), key=job.cases.stiffness_of)

@@ -1,6 +1,6 @@
 """The patches of the junction that shims may fill, and the thicknesses in stock."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise, product
 from operator import itemgetter
@@ -18,6 +18,7 @@ from problems.model.surface_cells import cross
 
 MOST, USUAL = 1000, 16  # patches, and thicknesses; patches if none are given
 NEAR = 1e-6  # mm: closer borders are one
+RASTER = 32  # points along a side of the box of two outlines
 BORDERS, CORNERS = ("x_min", "x_max", "y_min", "y_max"), ("x", "y")
 SHAPE = "x_min < x_max and y_min < y_max, or 3 corners or more, each with the name of the outline"
 Shape = tuple[str, tuple[Place, ...], str]  # name, corners, and where it is in its file
@@ -86,16 +87,16 @@ def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
 
 
 def corners_of(west: float, east: float, south: float, north: float) -> tuple[Place, ...]:
-    """The corners of a rectangle; none of one without width."""
+    """The corners of a rectangle; only two of one without width or height."""
     corners = (west, south), (east, south), (east, north), (west, north)
-    return corners if west < east and south < north else ()
+    return corners if west < east and south < north else corners[::2]
 
 
 def made(
     joint: AnyJoint, shapes: Sequence[Shape], pairs: Iterable[Pair], source: str = "--patches"
 ) -> tuple[Patch, ...]:
     """A patch for each shape in each pair. Raises InputError if an outline is none, off the junction, without
-    a contact, or with one of another's.
+    a contact, or overlaps another.
     """
     low, high = joint.bounds[0] - NEAR, joint.bounds[1] + NEAR
     faults = [Fault(source, at, outline, SHAPE) for _, outline, at in shapes if len(outline) < 3]
@@ -104,18 +105,29 @@ def made(
             faults.append(Fault(source, at, name, "a name of its own, its corners one after another"))
         off = [place for place in outline if (place < low).any() or (place > high).any()]
         faults += [Fault(source, at, place, on_junction(joint)) for place in off[:1]]
-    patches, owner = [], np.full(joint.size[1], "", dtype=object)
-    for pair, (name, outline, at) in product(pairs, shapes):
+    patches, sound = [], [shape for shape in shapes if len(shape[1]) >= 3]
+    for pair, (name, outline, at) in product(pairs, sound):
         between, where = (None, "") if len(joint.pairs) == 1 else (pair, f" {'–'.join(pair)}")
-        if len(outline) < 3:
-            continue
         shim = Shims(kind="shims", thickness=1.0, outline=outline, between=between)
         patches.append(Patch(f"{name}{where}", outline, shim))
-        inside = shim.gap(joint) < 0
         faults += [Fault(source, f"{at or name}, {f[0]}", *f[1:]) for f in shim.faults(joint)]
-        for other in sorted({*owner[inside]} - {""}):
-            faults.append(Fault(source, at or name, name, f"apart from other patches: it overlaps {other}"))
-        owner[inside] = at or name
+    for k, other in _overlaps([patch.shim for patch in patches[: len(sound)]], joint):
+        (name, _, at), (other_name, _, other_at) = sound[k], sound[other]
+        allowed = f"apart from other patches: it overlaps {other_at or other_name}"
+        faults.append(Fault(source, at or name, name, allowed))
     if faults:
         raise InputError(faults)
     return tuple(patches)
+
+
+def _overlaps(shims: Sequence[Shims], joint: AnyJoint) -> Iterator[tuple[int, int]]:
+    """Yield the numbers of two shims that both cover a contact, or a point of a raster in the box of both."""
+    contacts = np.concatenate([np.zeros((0, 2)), *map(joint.places, joint.pairs)])
+    boxes = np.array([shim.ranges for shim in shims]).reshape(-1, 2, 2)
+    for k, shim in enumerate(shims):
+        low, high = np.maximum(boxes[:k, :, 0], boxes[k, :, 0]), np.minimum(boxes[:k, :, 1], boxes[k, :, 1])
+        for other in np.flatnonzero((high - low > NEAR).all(axis=1)).tolist():
+            lines = np.linspace(low[other], high[other], 2 * RASTER + 1)[1::2].T
+            points = np.concatenate([np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, 2), contacts])
+            if (shim.covers(points, joint) & shims[other].covers(points, joint)).any():
+                yield k, other

@@ -1,29 +1,24 @@
 """Searches for shims and writes them: as a scene, a table and a drawing, and as a report."""
 
-from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tomlkit
 
 from harness.measurement.scheduler import workers
 from harness.placement.answer_journal import AnswerJournal, refuse_other_command
 from harness.placement.candidates import Plan
-from harness.placement.fresh_cases import ALPHA, Cases, Found, Goal, search_in_rounds
+from harness.placement.fresh_cases import ALPHA, Cases, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
-from harness.placement.session import Outcome, PlanSession
+from harness.placement.session import PlanSession
 from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints, installed_version, stamp
-from harness.scene.allowed_gap import check_answer
-from harness.scene.mesh_error import estimated, mesh_record
 from harness.scene.scene_file import edited
-from harness.scene.solution import solve
 from harness.scene.stress import refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.staged import last_scene
@@ -34,26 +29,24 @@ from problems.errors import Fault, InputError
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_inputs import RandomInputs
 from problems.model.effect import SpringEffect
-from problems.model.fastener_forces import fastener_forces
 from problems.model.positions import Positions
 from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from problems.storage import digest
-from report.document.numbers import counted, position
 
 from .each import each_joint
 from .gap_regions import patches_of_gap
-from .patches import BORDERS, patches_of, stock_of
+from .outcome import UNITS, as_solved, figures_of, record_of, sentence_of
+from .patches import patches_of, stock_of
 from .search import ShimSearch
 from .study import ShimStudy
 
-RECORD, ANSWERS = "shim.json", "shims.jsonl"
+RECORD = "shim.json"
 MOST = 1e9  # of a limit: larger ones are none
-UNITS = ("N", "N/mm²")  # of the limits of force and stress
 MESH = "Mesh error: not part of it; the report of a single joint has it"
 REPORT = ("report.md", "index.html", "sheet.pdf", "shims.csv", "shims.png", "forces.csv")
-OUTPUTS = (RECORD, ANSWERS, "shimmed.toml", *REPORT, "stock.csv", "stock.png", "joints.csv")
+OUTPUTS = (RECORD, records.SHIMS, "shimmed.toml", *REPORT, "stock.csv", "stock.png", "joints.csv")
 
 
 @dataclass(frozen=True)
@@ -207,23 +200,23 @@ def shim(
         "form": form,
         "rivetbench_version": installed_version("rivetbench"),
     }
-    refuse_other_command(directory, OUTPUTS, ANSWERS)
+    refuse_other_command(directory, OUTPUTS, records.SHIMS)
     if order.table:
         reporter.say(HELD_BACK)
-    with records.locked(directory, (), other=records.MEASUREMENTS):
+    with records.locked(directory, records.SHIMS):
         pool = workers(scheduler, console_of(reporter)) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
-            journal = AnswerJournal(study, directory / ANSWERS, identity, executor)
+            journal = AnswerJournal(study, directory / records.SHIMS, identity, executor)
             plan: Plan = ()
             if each:
                 joints, *pair, words, passed = each_joint(journal, study, goal, thicknesses, reporter)
-                record = {"joints": joints, "samples": [], **_figures(study, *pair)}
+                record = {"joints": joints, "samples": [], **figures_of(study, *pair)}
                 record |= {"forces": [], "sure": ["Solver: every gap is a proven upper bound", MESH]}
             else:
                 search = ShimSearch(journal, 0, 0, allow_gap_mm, study, thicknesses, reporter=reporter)
                 result = search_in_rounds(search, (), goal, order)
-                plan, record = result.best.plan if result.best else (), _record(result, study)
-                words, passed = _sentence(result, goal, study)
+                plan, record = result.best.plan if result.best else (), record_of(result, study)
+                words, passed = sentence_of(result, goal, study)
         from report.writers.shim_report import write  # slow to import: not before the search
 
         files = fingerprints([*bare.sources, *(file for file in inputs[1:] if file.is_file())])
@@ -231,7 +224,7 @@ def shim(
         record |= asked | {"said": words, **stamp()}
         if not each:
             records.replace_text(directory / "shimmed.toml", text([study.effect(item) for item in plan]))
-            record |= _as_solved(directory / "shimmed.toml", len(plan), allow_gap_mm)
+            record |= as_solved(directory / "shimmed.toml", len(plan), allow_gap_mm)
         records.replace_object(directory / RECORD, record)
         sizes = {there[int(k)].name: t[0] if len(t) == 1 else tuple(t) for k, *t in plan}
         return Shimming(sizes, passed, words, write(directory))
@@ -252,72 +245,3 @@ def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     if not scene.joint.pairs:
         faults.append(Fault(where, "contacts", "none", "a contact that a shim can fill"))
     return faults
-
-
-def _sentence(result: Found, goal: Goal, study: ShimStudy) -> tuple[str, bool]:
-    """The outcome in words, and whether the plan passed."""
-    step, sample = result.best, result.samples[-1] if result.samples else None
-    least = step or min(result.steps, key=lambda step: step.gap_mm)
-    figures = least.outcome.further[least.worst]
-    gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
-    most = "".join(f", {value:.3g} {unit}" for value, limit, unit in more if limit < inf)
-    leave = f"{gaps.max():.3g} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
-    if step is None:
-        words = "no shims of the stock are found with which all limits are kept; the best tried leave"
-        at = [*(f"in patch {patch.name}" for patch in study.patches), "beyond all patches"]
-        return f"FAIL: {words} {leave}, the largest gap {at[int(gaps.argmax())]}, proven.", False
-    passed, count = (sample.step if sample else step).gap_mm <= (goal.limit_mm or 0.0), len(step.plan)
-    words = f"{counted(count, 'shim') if count else 'the scene'} {'leave' if count > 1 else 'leaves'} {leave}"
-    words = sample.sentence(goal) if sample else words
-    none_needed = "" if count or not passed else "no shim is needed: "
-    return f"{'PASS' if passed else 'FAIL'}: {none_needed}{words}, proven.", passed
-
-
-def _figures(study: ShimStudy, before: Sequence[Outcome], after: Sequence[Outcome]) -> dict[str, Any]:
-    """Of each patch, and of all, the largest figures in some cases without shims and in some with them; of a
-    volume the mean.
-    """
-    count, joint = len(study.patches), study.bare.joint
-    old, new = (np.array([row for one in some for row in one.further]) for some in (before, after))
-    patches = [
-        {"patch": patch.name, "outline": patch.outline, "area_mm2": patch.area}
-        | dict(zip(BORDERS, patch.shim.ranges.ravel().tolist(), strict=True))
-        | {"gap_before_mm": old[:, k].max(), "gap_after_mm": new[:, k].max()}
-        | {"liquid_mm3": new[:, count + 1 + k].mean()}
-        for k, patch in enumerate(study.patches)
-    ]
-    names = ("gap", "force", "stress")
-    whole = {
-        when: dict(zip(names, (some[:, : count + 1].max(), *some[:, -2:].max(axis=0)), strict=True))
-        for when, some in {"before": old, "after": new}.items()
-    }
-    contacts = [contact for one in after for contact in one.contact]
-    worst = contacts[int(new[:, : count + 1].max(axis=1).argmax())]
-    drawn = {"bounds": joint.bounds.tolist(), "marks": study.bare.marks().tolist()}
-    return {"patches": patches, **whole, **drawn, "worst_at": position(study.places[worst], study.places)}
-
-
-def _record(result: Found, study: ShimStudy) -> dict[str, Any]:
-    """The figures before, in the cases that chose, and after, in those that decided, and what was tried."""
-    best = result.best or result.steps[0]
-    after = result.samples[-1].step if result.samples else best
-    figures = _figures(study, [result.steps[0].outcome], [after.outcome])
-    sizes = {int(k): t for k, *t in best.plan}
-    for k, patch in enumerate(figures["patches"]):
-        patch["thickness_mm"], *end = sizes.get(k, [0.0] * study.ends)
-        patch |= {"thickness_end_mm": end[0]} if end else {}
-    samples = [{"cases": len(s.numbers), "kept": s.kept, "interval": s.interval} for s in result.samples]
-    steps = [{"moved": step.moved, "gap_mm": step.gap_mm, "plan": step.plan} for step in result.steps]
-    return figures | {"samples": samples, "steps": steps}
-
-
-def _as_solved(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:
-    """What `solve` says of the scene with shims, and the forces in its fasteners without and with them."""
-    after: Any = read_scene(str(path))
-    without = replace(after, effects=after.effects[: len(after.effects) - shims])
-    answers = [solve(without), solve(after)]
-    check = check_answer(answers[1], allowed_mm, [], mesh := estimated(answers[1]))
-    pairs = zip(*(fastener_forces(answer.problem.scene, answer.x) for answer in answers), strict=True)
-    sure = [f"Solver: gaps proven to {check['uncertainty_mm']:.1e} mm", mesh_record(mesh)["said"]]
-    sure.append(f"Scan: {check.get('beyond_scan', 'no contact is beyond measured points')}")
-    return {"sure": sure, "forces": [old | {"with_shims_N": new["force_N"]} for old, new in pairs]}

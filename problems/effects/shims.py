@@ -55,7 +55,7 @@ class Shims(ContactEffect, GapEffect):
             yield "outline", list(self.outline), "corners in their order around it: two of its edges cross"
         pairs = [pair for pair in self.pairs(joint) if pair in joint.pairs]
         places = np.concatenate([np.zeros((0, 2)), *map(joint.places, pairs)])
-        if len(places) and not self._covered(places, joint).any():
+        if len(places) and not self.covers(places, joint).any():
             x, y = places[((places - self.ranges.mean(axis=1)) ** 2).sum(axis=1).argmin()]
             yield "x, y", self.ranges.tolist(), f"ranges with a node; the nearest: at {x:g}, {y:g} mm"
 
@@ -66,7 +66,7 @@ class Shims(ContactEffect, GapEffect):
             side, (first, last) = cross(b - a, start - a), (cross(stop - start, p - start) for p in (a, b))
             yield bool(((side * np.roll(side, -1) < 0) & (first * last < 0)).any())
 
-    def _covered(self, places: Matrix, joint: AnyJoint) -> Mask:
+    def covers(self, places: Matrix, joint: AnyJoint) -> Mask:
         """(k,) which places are in the rectangle, or in the polygon: a ray from them to the right crosses its
         border an odd number of times.
         """
@@ -91,6 +91,6 @@ class Shims(ContactEffect, GapEffect):
         def filled(pair: Pair) -> Vector:
             places = joint.places(pair)
             thickness = first + (last - first) * self.along(places)
-            return np.where(self._covered(places, joint), -thickness, 0.0)
+            return np.where(self.covers(places, joint), -thickness, 0.0)
 
         return at_contacts(filled, self.pairs(joint), joint)

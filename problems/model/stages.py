@@ -103,6 +103,7 @@ class Plan:
                 frozenset((number, k) for k, word in enumerate(effect._stages) if word == stage),
             )
             for number, effect in enumerate(self.effects)
+            if stage in effect._stages
         ]
 
     def _named(self, number: int, key: str, references: Sequence[str]) -> list[tuple[str, Elements]]:
@@ -161,8 +162,12 @@ class Plan:
         told: set[str] = set()
         if not isinstance(self.joint, Joint) or self.wrong:
             return
+        stiff = {k for k, effect in enumerate(self.effects) if isinstance(effect, StiffnessEffect)}
+        first: dict[Elements, Acting] = {}
         for step in self.steps:
-            acting = acting_effects(self.effects, step.elements, self.joint).values()
+            first.setdefault(frozenset(one for one in step.elements if one[0] in stiff), step)
+        for elements, step in first.items():
+            acting = acting_effects(self.effects, elements, self.joint).values()
             held = [effect for effect in acting if isinstance(effect, StiffnessEffect)]
             where = f" in stage {step.name}" if step.name else ""
             for part in self.joint.part:

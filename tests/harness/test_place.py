@@ -18,12 +18,13 @@ from small_joints import FASTENERS, GAP, two_parts
 
 from harness import solve
 from harness.placement import search as search_module
-from harness.placement.answer_journal import PLANS, AnswerJournal
+from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, uniform_plans
 from harness.placement.fresh_cases import Cases, Goal, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question
 from harness.results import series_file
+from harness.results.records import PLANS
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
@@ -545,6 +546,11 @@ def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) ->
     assert done.exit_code == 2
     assert "has plan of another command: name another directory" in done.output
     assert not (tmp_path / PLANS).exists()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / PLANS).touch()
+    done = harness("series", strip, "--cases", 2, "--out", tmp_path / "other")
+    assert done.exit_code == 2
+    assert f"has the {PLANS} of another command: name another directory" in done.output
 
 
 def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:

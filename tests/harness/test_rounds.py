@@ -1,5 +1,6 @@
 """`beside` of a suite: rounds of ours beside libraries, what stays published and what is measured anew."""
 
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -19,7 +20,7 @@ from harness.measurement.task import Task, TaskResult
 from harness.measurement.worker import OWN_LIMIT, Run
 from harness.planning.plan import expand
 from harness.planning.suite import Suite, read_suite
-from harness.results.records import OUTDATED, Row, read
+from harness.results.records import MEASUREMENTS, OUTDATED, Row, read, rewrite
 from problems.errors import InputError
 from report.document.blocks import Table
 from report.results.reader import read as read_results
@@ -155,6 +156,26 @@ def test_only_a_changed_library_is_measured_anew(release: Callable[..., list[Row
     ]
     assert release("third", b="2")
     assert len(read_results(folder).rounds) == 4
+
+
+def test_an_interrupted_run_goes_on_with_another_commit(
+    release: Callable[..., list[Row]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Also where older rows are published; logs are taken along."""
+    monkeypatch.setattr(published, "WITH_LOGS", ("small",))
+    release("zeroth", a="0", b="0")
+    first = [row | {"log": f"logs/{row['variant']}.txt"} for row in release("first")]
+    folder, left = (tmp_path / at / "small" for at in ("published", "publishing/first"))
+    shutil.copytree(folder, left)
+    rewrite(left / MEASUREMENTS, first[:-1])
+    (left / "logs").mkdir(exist_ok=True)
+    (left / "logs/a.txt").write_text("iter 1\n")
+    rewrite(folder / MEASUREMENTS, [row | {"recorded_at": "2025-01-01T00:00:00+00:00"} for row in first[:1]])
+
+    second = release("second")
+    assert made(second, "second") == [*OURS, *ROUND, "b"]
+    assert made(second, "first") == [*ROUND, "a"]
+    assert (folder / "logs/a.txt").read_text() == "iter 1\n"
 
 
 def test_a_row_of_a_round_is_measured_again_by_its_key(

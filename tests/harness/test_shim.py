@@ -152,6 +152,9 @@ def test_outlines_are_cut_to_any_shape(strip: Path, tmp_path: Path) -> None:
     x, _ = joint.places(joint.pairs[0]).T
     np.testing.assert_array_equal(both, np.where(x <= 120, -1.0, 0.0))
     assert (ell.area, other.area) == (60 * 50 + 60 * 25, 60 * 25)
+    csv.write_text("x_min,x_max,y_min,y_max\n0,55,0,50\n53,120,0,50\n")  # no contact is in both
+    with pytest.raises(InputError, match=r"line 3 .*overlaps line 2"):
+        patches_of(joint, str(csv))
     csv.write_text("name,x,y\none,0,0\none,9,9\ntwo,0,0\ntwo,50,0\ntwo,900,50\n")
     with pytest.raises(InputError, match=r"(?s)3 corners or more.*900.*on the junction"):
         patches_of(joint, str(csv))
@@ -339,7 +342,14 @@ def test_solve_says_the_same_of_one_joint(
         (("--patches", "0x4"), ["--patches", "columns x rows"]),
         (
             ("--patches", "patches.csv"),
-            ["line 2", "on the junction", "line 3", "overlaps line 2", "x_min < x_max"],
+            [
+                "line 2",
+                "on the junction",
+                "line 3",
+                "overlaps line 2",
+                "x_min < x_max",
+                "(9.0, 0.0), (9.0, 1.0)",
+            ],
         ),
         (("--patches", "outlines.csv"), ["line 2, outline", "two of its edges cross", "a name of its own"]),
         (("--allow-gap", -1), ["limit_mm", "above 0"]),

@@ -96,6 +96,15 @@ def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path) -> None:
             assert (border == 1.0).all()
 
 
+def test_the_faults_of_both_scenes_are_told(tmp_path: Path) -> None:
+    first = write(tmp_path / "first.toml", JOINT.replace("length = 160.0", "length = -160.0"))
+    second = write(tmp_path / "second.toml", JOINT + '[[effect]]\nkind = "glue"\n')
+    done = harness("solve", first, second, "--out", tmp_path / "both")
+    assert done.exit_code == 2
+    assert "length = -160.0" in done.output
+    assert ".kind = 'glue'" in done.output
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [

@@ -102,17 +102,21 @@ def test_one_that_fails_is_not_published(there: Path, monkeypatch: pytest.Monkey
     assert published.is_of(published.rows_of(there / "default"), "b" * 40)
 
 
-def test_scenes_and_large_answers_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scenes_large_answers_and_most_logs_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
+    monkeypatch.setattr(published, "WITH_LOGS", ("large",))
     for name, size in (("small", 1000), ("large", published.KEPT_KIB * 2**10 + 1)):
         folder = tmp_path / name
         measured(folder, row())
-        for file in ("answers/a.npz", "answers/.lock", ".lock", "scenes/a.npz"):
+        for file in ("answers/a.npz", "answers/.lock", ".lock", "scenes/a.npz", "logs/a.txt"):
             (folder / file).parent.mkdir(exist_ok=True)
             (folder / file).write_bytes(bytes(10 if file == ".lock" else size))
         published.publish(name, folder)
     kept = {str(path.relative_to(tmp_path / "published")) for path in (tmp_path / "published").rglob("*.*")}
-    assert kept == {f"small/{MEASUREMENTS}", f"large/{MEASUREMENTS}", "small/answers.zip"}
+    rows = {f"small/{MEASUREMENTS}", f"large/{MEASUREMENTS}"}
+    assert kept == rows | {"small/answers.zip", "large/logs/a.txt"}
 
 
 @pytest.mark.parametrize("code", [(CODE, False), ("0.1.0", None)])

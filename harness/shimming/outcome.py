@@ -1,0 +1,92 @@
+"""The outcome of a search for shims: in words, and the figures of its record."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.placement.fresh_cases import Found, Goal
+from harness.placement.session import Outcome
+from harness.scene.allowed_gap import check_answer
+from harness.scene.mesh_error import estimated, mesh_record
+from harness.scene.solution import solve
+from problems.model.fastener_forces import fastener_forces
+from problems.scene_files import read_scene
+from report.document.numbers import counted, position
+
+from .patches import BORDERS
+from .study import ShimStudy
+
+UNITS = ("N", "N/mm²")  # of the limits of force and stress
+
+
+def sentence_of(result: Found, goal: Goal, study: ShimStudy) -> tuple[str, bool]:
+    """The outcome in words, and whether the plan passed."""
+    step, sample = result.best, result.samples[-1] if result.samples else None
+    least = step or min(result.steps, key=lambda step: step.gap_mm)
+    figures = least.outcome.further[least.worst]
+    gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
+    most = "".join(f", {value:.3g} {unit}" for value, limit, unit in more if limit < inf)
+    leave = f"{gaps.max():.3g} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
+    if step is None:
+        words = "no shims of the stock are found with which all limits are kept; the best tried leave"
+        at = [*(f"in patch {patch.name}" for patch in study.patches), "beyond all patches"]
+        return f"FAIL: {words} {leave}, the largest gap {at[int(gaps.argmax())]}, proven.", False
+    passed, count = (sample.step if sample else step).gap_mm <= (goal.limit_mm or 0.0), len(step.plan)
+    words = f"{counted(count, 'shim') if count else 'the scene'} {'leave' if count > 1 else 'leaves'} {leave}"
+    words = sample.sentence(goal) if sample else words
+    none_needed = "" if count or not passed else "no shim is needed: "
+    return f"{'PASS' if passed else 'FAIL'}: {none_needed}{words}, proven.", passed
+
+
+def figures_of(study: ShimStudy, before: Sequence[Outcome], after: Sequence[Outcome]) -> dict[str, Any]:
+    """Of each patch, and of all, the largest figures in some cases without shims and in some with them; of a
+    volume the mean.
+    """
+    count, joint = len(study.patches), study.bare.joint
+    old, new = (np.array([row for one in some for row in one.further]) for some in (before, after))
+    patches = [
+        {"patch": patch.name, "outline": patch.outline, "area_mm2": patch.area}
+        | dict(zip(BORDERS, patch.shim.ranges.ravel().tolist(), strict=True))
+        | {"gap_before_mm": old[:, k].max(), "gap_after_mm": new[:, k].max()}
+        | {"liquid_mm3": new[:, count + 1 + k].mean()}
+        for k, patch in enumerate(study.patches)
+    ]
+    names = ("gap", "force", "stress")
+    whole = {
+        when: dict(zip(names, (some[:, : count + 1].max(), *some[:, -2:].max(axis=0)), strict=True))
+        for when, some in {"before": old, "after": new}.items()
+    }
+    contacts = [contact for one in after for contact in one.contact]
+    worst = contacts[int(new[:, : count + 1].max(axis=1).argmax())]
+    drawn = {"bounds": joint.bounds.tolist(), "marks": study.bare.marks().tolist()}
+    return {"patches": patches, **whole, **drawn, "worst_at": position(study.places[worst], study.places)}
+
+
+def record_of(result: Found, study: ShimStudy) -> dict[str, Any]:
+    """The figures before, in the cases that chose, and after, in those that decided, and what was tried."""
+    best = result.best or result.steps[0]
+    after = result.samples[-1].step if result.samples else best
+    figures = figures_of(study, [result.steps[0].outcome], [after.outcome])
+    sizes = {int(k): t for k, *t in best.plan}
+    for k, patch in enumerate(figures["patches"]):
+        patch["thickness_mm"], *end = sizes.get(k, [0.0] * study.ends)
+        patch |= {"thickness_end_mm": end[0]} if end else {}
+    samples = [{"cases": len(s.numbers), "kept": s.kept, "interval": s.interval} for s in result.samples]
+    steps = [{"moved": step.moved, "gap_mm": step.gap_mm, "plan": step.plan} for step in result.steps]
+    return figures | {"samples": samples, "steps": steps}
+
+
+def as_solved(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:
+    """What `solve` says of the scene with shims, and the forces in its fasteners without and with them."""
+    after: Any = read_scene(str(path))
+    without = replace(after, effects=after.effects[: len(after.effects) - shims])
+    answers = [solve(without), solve(after)]
+    check = check_answer(answers[1], allowed_mm, [], mesh := estimated(answers[1]))
+    pairs = zip(*(fastener_forces(answer.problem.scene, answer.x) for answer in answers), strict=True)
+    sure = [f"Solver: gaps proven to {check['uncertainty_mm']:.1e} mm", mesh_record(mesh)["said"]]
+    sure.append(f"Scan: {check.get('beyond_scan', 'no contact is beyond measured points')}")
+    return {"sure": sure, "forces": [old | {"with_shims_N": new["force_N"]} for old, new in pairs]}
