@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 CONTROL = re.compile("[\0-\x1f\x7f]")
-In, Out = TypeVar("In"), TypeVar("Out")
+In = TypeVar("In")
+Out = TypeVar("Out")
 #: A hint for "parts\\top.npz" in a TOML file, which is a tab and op.npz.
 BACKSLASH = "; a backslash in TOML's double quotes begins an escape: write /, or single quotes"
 
