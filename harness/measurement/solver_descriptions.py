@@ -18,7 +18,7 @@ from harness.results import records
 from harness.results.records import Row
 from harness.results.row_validation import refuse_wrong_kinds
 from harness.solving.solver_answer import shown
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, read_all
 from problems.forms import FORMS, default_form
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
@@ -126,23 +126,18 @@ def described_here(
     begin: Callable[[str], None] = lambda name: None,
 ) -> list[Description]:
     """The descriptions, made in this process. Raises InputError, all faults at once."""
-    descriptions: list[Description] = []
-    faults: list[Fault] = []
-    for name, options in solvers:
+
+    def describe_one(named: Named) -> Description:
+        name, options = named
         begin(name)
-        try:
-            solver = make_solver(name, options, plugin)
-            forms = solver.forms
-            if not isinstance(forms, tuple | list) or not forms or not all(form in FORMS for form in forms):
-                allowed = f"a tuple of {', '.join(FORMS)}"
-                raise InputError.one(f"solver {name}", "forms", shown(forms), allowed)
-            version, code = solver_version(name, plugin), code_of(solver)
-            descriptions.append(Description(list(forms), version, code, owner_of(name)))
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
-    return descriptions
+        solver = make_solver(name, options, plugin)
+        forms = solver.forms
+        if not isinstance(forms, tuple | list) or not forms or not all(form in FORMS for form in forms):
+            allowed = f"a tuple of {', '.join(FORMS)}"
+            raise InputError.one(f"solver {name}", "forms", shown(forms), allowed)
+        return Description(list(forms), solver_version(name, plugin), code_of(solver), owner_of(name))
+
+    return read_all(describe_one, solvers)
 
 
 def code_of(solver: Solver) -> str:

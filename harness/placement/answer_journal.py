@@ -1,6 +1,6 @@
 """Answers to questions about plans, each kept in a file: an interrupted search finds them there."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict
 from math import inf
@@ -13,14 +13,6 @@ from harness.results import records
 from harness.results.records import to_line
 from problems.errors import InputError
 from problems.storage import digest
-
-
-def refuse_other_command(directory: Path, names: Iterable[str], journal: str) -> None:
-    """Raise InputError if the directory has some of the names, but not the journal among them."""
-    there = [name for name in names if (directory / name).exists()]
-    if there and journal not in there:
-        allowed = f"has {there[0]} of another command: name another directory"
-        raise InputError.one("--out", "directory", str(directory), allowed)
 
 
 class AnswerJournal:

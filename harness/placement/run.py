@@ -14,7 +14,7 @@ import pandas as pd
 
 from harness.measurement.scheduler import workers
 from harness.measurement.solver_descriptions import described
-from harness.placement.answer_journal import AnswerJournal, refuse_other_command
+from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
 from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
 from harness.placement.search import Search
@@ -166,7 +166,7 @@ def place(
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
-    refuse_other_command(directory, (*OUTPUTS, *SERIES), records.PLANS)
+    records.refuse_other_command(directory, records.PLANS, (*OUTPUTS, *SERIES))
     if order.table:
         reporter.say(HELD_BACK)
     nodes = prepared(study.bare, form=form).assembly.contact_nodes

@@ -12,7 +12,7 @@ from harness.placement.candidates import ROWS_AND_COLUMNS, Place
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
 from problems.input.tables import CSV_MIB, Cells, read_columns
-from problems.model.interface import AnyJoint, on_junction
+from problems.model.interface import AnyJoint, on_junction, places_of
 from problems.model.joint import Pair
 from problems.model.surface_cells import cross
 
@@ -122,7 +122,7 @@ def made(
 
 def _overlaps(shims: Sequence[Shims], joint: AnyJoint) -> Iterator[tuple[int, int]]:
     """Yield the numbers of two shims that both cover a contact, or a point of a raster in the box of both."""
-    contacts = np.concatenate([np.zeros((0, 2)), *map(joint.places, joint.pairs)])
+    contacts = places_of(joint, joint.pairs)
     boxes = np.array([shim.ranges for shim in shims]).reshape(-1, 2, 2)
     for k, shim in enumerate(shims):
         low, high = np.maximum(boxes[:k, :, 0], boxes[k, :, 0]), np.minimum(boxes[:k, :, 1], boxes[k, :, 1])

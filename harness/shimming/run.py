@@ -9,7 +9,7 @@ from typing import Any
 import tomlkit
 
 from harness.measurement.scheduler import workers
-from harness.placement.answer_journal import AnswerJournal, refuse_other_command
+from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import Plan
 from harness.placement.fresh_cases import ALPHA, Cases, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
@@ -200,7 +200,7 @@ def shim(
         "form": form,
         "rivetbench_version": installed_version("rivetbench"),
     }
-    refuse_other_command(directory, OUTPUTS, records.SHIMS)
+    records.refuse_other_command(directory, records.SHIMS, OUTPUTS)
     if order.table:
         reporter.say(HELD_BACK)
     with records.locked(directory, records.SHIMS):

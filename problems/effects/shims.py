@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded_types import NUMBER, NUMBERS, Finite, Positive, Range, is_list
 from problems.model.effect import ContactEffect, Effect, GapEffect
-from problems.model.interface import AnyJoint
+from problems.model.interface import AnyJoint, places_of
 from problems.model.joint import Faults, Pair
 from problems.model.junction_terms import at_contacts
 from problems.model.surface_cells import cross
@@ -53,8 +53,7 @@ class Shims(ContactEffect, GapEffect):
         yield from super().faults(joint, others)
         if any(self._crossed()):
             yield "outline", list(self.outline), "corners in their order around it: two of its edges cross"
-        pairs = [pair for pair in self.pairs(joint) if pair in joint.pairs]
-        places = np.concatenate([np.zeros((0, 2)), *map(joint.places, pairs)])
+        places = places_of(joint, (pair for pair in self.pairs(joint) if pair in joint.pairs))
         if len(places) and not self.covers(places, joint).any():
             x, y = places[((places - self.ranges.mean(axis=1)) ** 2).sum(axis=1).argmin()]
             yield "x, y", self.ranges.tolist(), f"ranges with a node; the nearest: at {x:g}, {y:g} mm"

@@ -1,8 +1,9 @@
 """The interface of a joint, of plates or of superelements, to effects, pictures and commands."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
+import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
@@ -126,3 +127,8 @@ def across(joint: AnyJoint, rows: Mapping[str, sp.sparray], count: int) -> sp.cs
     spans = {part: joint.unknowns(part) for part in joint.names}
     none = {part: sp.csr_array((count, span.stop - span.start)) for part, span in spans.items()}
     return sp.csr_array(sp.hstack([rows.get(part, none[part]) for part in joint.names]))
+
+
+def places_of(joint: AnyJoint, pairs: Iterable[Pair]) -> Matrix:
+    """(k, 2) the places of the contacts of some pairs, mm."""
+    return np.concatenate([np.zeros((0, 2)), *map(joint.places, pairs)])

@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
 
-from problems.errors import InputError
+from problems.errors import read_all
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.input.bounded_types import Positive
 
@@ -65,14 +65,7 @@ class SuperelementJoint:
     @classmethod
     def of(cls, folder: Path, table: SuperelementJointTable) -> "SuperelementJoint":
         """Read the parts. Raises InputError with all faults of all files."""
-        parts, faults = [], []
-        for part in table.part:
-            try:
-                parts.append(Superelement.of(folder, part))
-            except InputError as error:
-                faults += error.faults
-        if faults:
-            raise InputError(faults)
+        parts = read_all(lambda part: Superelement.of(folder, part), table.part)
         return cls(tuple(parts), table.pairing.distance, table.contacts)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
 
 from .effect import Effect
+from .interface import places_of
 from .junction_terms import junction_load
 from .scene import JointScene
 from .springs import Springs
@@ -120,7 +121,7 @@ class SuperelementModel:
         nodes = np.concatenate(inplane)
         names = tuple(" + ".join(joint.names[part] for part in group) for group in self.springs.ranges)
         notes = tuple(note for part in joint.parts for note in part.notes)
-        places = np.concatenate([np.zeros((0, 2)), *map(joint.places, joint.pairs)])
+        places = places_of(joint, joint.pairs)
         return Assembly(Stiffness.of(*blocks, nodes=nodes), self.A, nodes, names, notes, places=places)
 
     def _refuse_free(self) -> None:

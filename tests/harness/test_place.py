@@ -550,7 +550,7 @@ def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) ->
     (tmp_path / "other" / PLANS).touch()
     done = harness("series", strip, "--cases", 2, "--out", tmp_path / "other")
     assert done.exit_code == 2
-    assert f"has the {PLANS} of another command: name another directory" in done.output
+    assert f"has {PLANS} of another command: name another directory" in done.output
 
 
 def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:
