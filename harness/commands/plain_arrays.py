@@ -71,8 +71,8 @@ def own_matrices(
     0.200 mm, 30.000 N
     """
     vectors = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
-    arrays = {name: M if sp.issparse(M) else np.asarray(M) for name, M in (("K", K), ("A", A))}
-    arrays |= {name: np.array(value) for name, value in vectors.items()}
+    arrays = {name: M if sp.issparse(M) else np.asanyarray(M) for name, M in (("K", K), ("A", A))}
+    arrays |= {name: np.array(value, subok=True) for name, value in vectors.items()}
     sparse = sp.issparse(K) and K.shape[0] > SMALL
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
     return ManufacturedScene.of(title, ManufacturedProblem(assembly, load), title)
@@ -285,6 +285,8 @@ def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:
         vector = np.array(value, dtype=float)  # a copy, which a form may make read-only
     except (TypeError, ValueError) as error:
         raise InputError.one(where, name, value, "must be numbers") from error
+    if np.ma.is_masked(value):
+        raise InputError.one(where, name, "a masked array", "a number in each place; some are masked")
     if vector.shape != (size,):
         raise InputError.one(where, f"{name}.shape", vector.shape, f"must be ({size},)")
     for k in np.flatnonzero(~np.isfinite(vector))[:1]:

@@ -99,7 +99,7 @@ def _read_all(sources: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[
             if name:
                 read = {name: formats.read_stiffness(path, matrix, name)[:2]}
             else:
-                read = formats.read_labelled(path, partial(_of_problem, faults, path))
+                read = formats.read_labelled(path, partial(_of_problem, faults, path, matrix))
             for key, (values, labels) in read.items():
                 if key in of_rank:
                     allowed = f"is in {of_rank[key]} too; say {key}=FILE for the one that counts"
@@ -122,11 +122,13 @@ def _read_all(sources: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[
     return data, origin, notes
 
 
-def _of_problem(faults: list[Fault], path: Path, names: Sequence[str]) -> list[str]:
-    """Those names that a problem has; the others are added to the faults."""
+def _of_problem(faults: list[Fault], path: Path, matrix: str, names: Sequence[str]) -> list[str]:
+    """Those names that a problem has, or `matrix` alone; the others are added to the faults."""
     allowed = "K, A, f, g or nodes; say K=FILE, or K=FILE:NAME where the matrix has another name"
-    faults += [Fault(str(path), "matrix", name, allowed) for name in names if name not in NAMES]
-    return [name for name in names if name in NAMES]
+    wanted = [matrix] if matrix else names
+    wrong = [name for name in wanted if name not in NAMES or name not in names]
+    faults += [Fault(str(path), "matrix", name, allowed) for name in wrong]
+    return [name for name in wanted if name not in wrong]
 
 
 def _order(labels: formats.Labels) -> str:

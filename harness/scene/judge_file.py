@@ -1,7 +1,7 @@
 """Judges an answer that another program has computed: x or λ from a .npz or .csv file."""
 
-from collections.abc import Mapping
-from math import inf
+from collections.abc import Iterable, Mapping
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem, measurable
 from problems.errors import InputError
 from problems.forms import Form
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Assembly, Vector
 from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import damage
 from problems.input.tables import Cells, doubt, is_stray, number
@@ -25,6 +25,8 @@ from report.document.numbers import position
 MIB = 1024
 #: The vectors of an answer, by their names in a file.
 VECTORS = {"x": "x", "displacement_mm": "x", "lam": "lam", "force_N": "lam"}
+PLACES = ("x_mm", "y_mm")
+SAME_PLACE = 1e-6  # of the extent of the nodes
 ALLOWED = "a .npz or .csv file with numbers"
 CODES = {"within": DONE, "outside": FAILED, "cannot_be_judged": NOTHING_JUDGED}
 
@@ -51,6 +53,7 @@ def judge_file(
         if name in answer and len(answer[name]) != size:
             allowed = f"{size} in the {form} form of {problem.scene.name}; name another form with --form"
             raise Incomparable.one(path, f"length of {name}", len(answer[name]), allowed)
+    refuse_other_places(path, "x" if "x" in answer else "lam", assembly)
     lam = answer.get("lam", np.full(assembly.m, np.nan))
     x = answer["x"] if "x" in answer else problem.prepared.recover(lam, problem.load)
     limit = problem.limit_mm(limit_mm)
@@ -118,17 +121,31 @@ def read_answer(path: Path) -> dict[str, Vector]:
     return vectors
 
 
-def _columns(path: Path) -> dict[str, Vector]:
-    """The columns of VECTORS in a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
+def refuse_other_places(path: Path, name: str, assembly: Assembly) -> None:
+    """Raise InputError if a CSV file with x_mm and y_mm has its rows in another order than the scene."""
+    nodes = assembly.contact_nodes if name == "lam" else assembly.at_junction(assembly.nodes)
+    places = _columns(path, PLACES) if path.suffix.lower() == ".csv" else {}
+    if nodes is None or len(places) < len(PLACES) or len(places[PLACES[0]]) != len(nodes):
+        return
+    told = np.column_stack([places[heading] for heading in PLACES])
+    away = abs(told - nodes).max(axis=1) > SAME_PLACE * np.ptp(nodes, axis=0).max()
+    for k in np.flatnonzero(away)[:1]:
+        allowed = f"the scene has {position(nodes[k], nodes)} there: rows in its order"
+        raise InputError.one(path, f"row {k + 1}, place", position(told[k], nodes), allowed)
+
+
+def _columns(path: Path, wanted: Iterable[str] = VECTORS) -> dict[str, Vector]:
+    """The wanted columns of a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
     table = Cells.of(path, MIB, ())
     rows = table.rows()
     heads = ([cell.lstrip("# ") for cell in cells] for _, cells in rows)
     header = next((cells for cells in heads if not {*VECTORS}.isdisjoint(cells)), [])
-    names = [name for name in VECTORS if name in header]
+    names = [name for name in wanted if name in header]
     if twice := [name for name in names if header.count(name) > 1]:
         raise InputError.one(path, "names", twice, "each heading once")
     at = [header.index(name) for name in names]
     mark, read, index = table.decimal_mark(at), [], []
+    of_index = header.index("index") if "index" in header else 0
     for line, cells in rows:
         texts = [cells[k] if k < len(cells) else "" for k in at]
         read.append([number(text, mark)[0] for text in texts])
@@ -137,8 +154,9 @@ def _columns(path: Path) -> dict[str, Vector]:
                 doubt(texts, mark) or f"every cell must be a finite number, one for each heading; {ALLOWED}"
             )
             raise InputError.one(path, f"line {line}", table.delimiter.join(cells), allowed)
-        index.append(number(cells[0], mark)[0])
+        index.append(number(cells[of_index], mark)[0] if of_index < len(cells) else nan)
     ascending = sorted(index)
-    if 0 not in at and index != ascending and (np.diff(ascending) == 1).all():
-        raise InputError.one(path, "first column", header[0], "an index that ascends: sort the rows by it")
+    if of_index not in at and index != ascending and (np.diff(ascending) == 1).all():
+        allowed = "an index that ascends: sort the rows by it"
+        raise InputError.one(path, f"column {of_index + 1}", header[of_index], allowed)
     return {name: np.array([row[k] for row in read]) for k, name in enumerate(names)}

@@ -157,5 +157,6 @@ def format_of(path: Path) -> Format:
 
 
 def vector(values: Any) -> np.ndarray:
-    """A row or column of a matrix file, dense or sparse, as a vector."""
-    return np.ravel(values.toarray() if sp.issparse(values) else values)
+    """A row or column of a matrix file, dense or sparse, as a vector; what is neither as it is."""
+    dense = np.asarray(values.toarray() if sp.issparse(values) else values)
+    return dense if min(dense.shape, default=1) > 1 else dense.ravel()

@@ -11,7 +11,7 @@ have all its rows, 1 … r, unless it is square.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -84,7 +84,7 @@ def _read(path: Path, name: str, cards: dict[str, Cards]) -> tuple[Any, np.ndarr
         labels = np.array(points, dtype=np.intp)
         return _over(path, name, cards[name], points, points, "points"), labels
     if name == "G" and "A" in cards:
-        rows, what = _first(max(column for _, (column, _), *_ in cards["A"].entries)), "contacts of A"
+        rows, what = _columns(path, "A", cards), "contacts of A"
     elif "K" in cards:
         rows, what = cards["K"].points, "points of K"
     else:
@@ -94,13 +94,22 @@ def _read(path: Path, name: str, cards: dict[str, Cards]) -> tuple[Any, np.ndarr
     if name in "FG" and len(columns) > 1:
         raise InputError.one(path, f"columns of {name}", len(columns), "must be 1")
     if name not in "FG":
-        columns = _first(max(number for number, _ in columns))
+        columns = _columns(path, name, cards)
     what = f"{what}, or of columns 1 … {len(columns)}"
     return _over(path, name, cards[name], rows, columns, what), None
 
 
 def _first(count: int) -> list[Point]:
     return [(k + 1, 0) for k in range(count)]
+
+
+def _columns(path: Path, name: str, cards: dict[str, Cards]) -> list[Point]:
+    """The columns 1 … m of a rectangular matrix. Raises InputError if one of them has no entry."""
+    columns = {column for _, (column, _), *_ in cards[name].entries}
+    if len(columns) < (last := max(columns)):
+        missing = next(k for k in range(1, last) if k not in columns)
+        raise InputError.one(path, f"{name}, column {missing}", None, f"columns 1 … {last}, none left out")
+    return _first(last)
 
 
 def _over(
@@ -131,7 +140,7 @@ def _cards(path: Path) -> dict[str, Cards]:
         line = text.count("\n", 0, included.start()) + 1
         allowed = "is not followed: give the file that holds the cards"
         raise InputError.one(path, f"line {line}", included[0], allowed)
-    for (line, name), *fields in _fields(text):
+    for (line, name), *fields in _fields(path, text):
         name = name.upper()
         point, component, third, *rest = fields
         if point[1] == "0":
@@ -159,9 +168,12 @@ def _cards(path: Path) -> dict[str, Cards]:
     return {name: matrix for name, matrix in matrices.items() if matrix.entries}
 
 
-def _fields(text: str) -> list[list[tuple[int, str]]]:
-    """The fields of each card after its own name, with the numbers of their lines."""
-    cards: list[list[tuple[int, str]]] = []
+def _fields(path: Path, text: str) -> Iterator[list[tuple[int, str]]]:
+    """Yield the fields of each card after its own name, with the numbers of their lines.
+
+    Raises InputError for a line with more fields than a card has.
+    """
+    card: list[tuple[int, str]] = []
     inside = False
     for number, line in enumerate(text.split("\n"), start=1):
         line = line.partition("$")[0].expandtabs().rstrip()
@@ -175,11 +187,16 @@ def _fields(text: str) -> list[list[tuple[int, str]]]:
         count = 4 if "*" in words[0] else 8
         if len(words) == 1:
             words += [line[k : k + 64 // count] for k in range(8, 72, 64 // count)]
-        words = [word.strip() for word in words[1 : 1 + count]]
-        if begins:
-            cards.append([])
-        cards[-1] += [(number, word) for word in words + [""] * (count - len(words))]
-    return cards
+        words, more = [[word.strip() for word in part] for part in (words[1 : 1 + count], words[2 + count :])]
+        if any(more):
+            allowed = f"at most {count} fields and one for the continuation; the rest in a line of its own"
+            raise InputError.one(path, f"line {number}", line, allowed)
+        if begins and card:
+            yield card
+            card = []
+        card += [(number, word) for word in words + [""] * (count - len(words))]
+    if card:
+        yield card
 
 
 def _whole(path: Path, at: tuple[int, str], blank: str = "") -> int:

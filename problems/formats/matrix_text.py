@@ -89,7 +89,7 @@ def _read(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
         allowed = "1 or more: what is below is made by Abaqus, such as a multiplier, and no unknown of a part"
         raise InputError.one(path, "nodes or rows", int(unknowns[0, 0]), allowed)
     if by_rows and n < last:
-        missing = int(np.setdiff1d(np.arange(1, last), unknowns)[0])
+        missing = 1 + int(np.argmax(unknowns[:, 0] != np.arange(1, n + 1)))
         raise InputError.one(path, f"row {missing}", None, f"rows are 1 … {last}, none left out")
     K = from_entries(path, (values, i, j), (n, n), line_of)
     return (mirrored(K) if one_sided(K) else K), None if by_rows else unknowns

@@ -87,9 +87,9 @@ def validation_faults(
 ) -> Iterator[Fault]:
     """Yield the faults of a table that is not a valid `model`, each with the unit of its key."""
     items = error.errors()
+    above = {item["loc"][:depth] for item in items for depth in range(len(item["loc"]))}
     for item in items:
-        depth = len(item["loc"])
-        if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
+        if item["loc"] in above:
             continue  # a consequence of a fault inside it
         keys = [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD, NUMBER, NUMBERS))]
         key = ".".join(filter(None, keys))

@@ -77,7 +77,8 @@ def read_entries(
     except ValueError as error:  # it says "row 0, column 3", but "row 1;" of the first row if it has too few
         k, sign = re.findall(r" row (\d+)([,;])", str(error))[0]
         key, line = line_of(int(k) - (sign == ";"))
-        allowed = f"each line must hold {', '.join(fields)}: whole numbers but the last, none out of range"
+        whole = "whole numbers but the last" if kind is float else "whole numbers"
+        allowed = f"each line must hold {', '.join(fields)}: {whole}, none out of range"
         raise InputError.one(path, key, line, allowed) from error
     return rows["places"] if count else None, rows["values"], lambda k: line_of(k)[0]
 

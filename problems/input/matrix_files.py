@@ -35,6 +35,8 @@ Choose = Callable[[Sequence[str]], Sequence[str]]
 
 def damage(error: Exception) -> str:
     """The words for what is wrong with a file, free of the Python terms in a library's exceptions."""
+    if isinstance(error, MemoryError):
+        return "more than the memory holds, or damaged"
     plain = isinstance(error, ValueError | OSError | Warning) and not isinstance(error, UnicodeError)
     if not plain or any(words in str(error) for words in ("invalid literal", "pickled", "itemsize")):
         return "damaged, or of another format"
@@ -82,6 +84,10 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
             stems = [name for name in stems if all(f"{name}_{part}" in files for part in PARTS)]
             parts = {f"{name}_{part}" for name in stems for part in PARTS}
             plain = [name for name in archive.files if name not in parts]
+            for name in stems:
+                if name in plain:
+                    allowed = "one of the two: the matrix alone, or its four parts"
+                    raise InputError.one(path, name, [name, f"{name}_data"], allowed)
             names = stems + [name for name in plain if name in expected or _kind(archive, name) in NUMBERS]
             wanted = choose(names)
             chosen = {name: unpacked(archive, name) if name in stems else archive[name] for name in wanted}

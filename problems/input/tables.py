@@ -29,6 +29,7 @@ from .bounded_types import LARGEST
 from .text_files import read_text
 
 CSV_MIB = 100
+MOST_COLUMNS = 3  # of --columns: x, y and a value
 MAX_FAULTS = 10  # reported one by one; the rest are counted
 NO_UNIT = {"": Fraction(1), "-": Fraction(1)}
 LENGTHS = NO_UNIT | {"mm": Fraction(1), "m": Fraction(1000), "ft": Fraction("304.8")}
@@ -39,8 +40,11 @@ FORCES = NO_UNIT | {"n": Fraction(1), "kn": Fraction(1000)}
 UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT) | {"preload": FORCES}
 WORDS = ("name", "stage", "side")  # headings of columns of words
 BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))
-FORCE = r"(preload)[\s_/,:-]*(?:in\s+)?[\[({]?\s*(.*?)\s*[\])}]?"
-HEADING = re.compile(rf"{FORCE}|(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
+FORCE = r"[kmd]?a?n|lbf?|kips?|kgf?|kp|\w.*[\[({].*"  # also those that are refused
+HEADING = re.compile(
+    rf"(preload)[\s_/,:-]+(?:in\s+)?({FORCE})|(.*?)\s*[\[({{]\s*(.*?)\s*[\])}}]"
+    rf"|(.*?)[\s_/,:-]+(?:in\s+)?({BARE})"
+)
 PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 APART = ".,' \u2019\u00a0\u2009\u202f"  # separators of thousands
 GROUPS = re.compile(rf"[+-]?[1-9]\d{{0,2}}([{APART}])\d{{3}}(?:\1\d{{3}})*(?:(?!\1)([.,])\d+)?", re.ASCII)
@@ -52,7 +56,8 @@ STRAY = "no more cells than headings, and none under an empty heading"
 class TableOptions:
     """How a user's table is read; the same for a file of a scene and for one of the command line.
 
-    columns : the headings, in the order in which the reader names the columns; by default these names.
+    columns : the headings, in the order in which the reader names the columns; by default these names. Three
+        may be given where two are read.
     missing : numbers and words that mark a value that is not there.
     skip_lines : the number of lines above the header, if a heading occurs in one of them.
     """
@@ -62,8 +67,9 @@ class TableOptions:
     skip_lines: int = 0
 
     def headings(self, names: Sequence[str]) -> dict[str, str]:
-        """The heading of each column by its name. Raises InputError if there are too few."""
-        if self.columns and len(self.columns) < len(names):
+        """The heading of each column by its name. Raises InputError if there are too few, or too many."""
+        count = len({*map(_plain, self.columns)})
+        if self.columns and not len(names) <= count == len(self.columns) <= max(len(names), MOST_COLUMNS):
             allowed = f"a heading for each of {', '.join(names)}, separated by commas"
             raise InputError.one("--columns", "headings", ", ".join(self.columns), allowed)
         return dict(zip(names, self.columns or names, strict=False))
@@ -120,20 +126,27 @@ class Cells:
         """
         text, wanted = read_text(path, "file", mib).split("\n"), set(wanted)
         skip = min(skip, len(text) - 1)
-        first = next((k for k in range(skip, len(text)) if _is_content(text[k])), skip)
+        lines = range(skip, len(text))
+        first = next((k for k in lines if _is_content(text[k])), skip)
         said = re.fullmatch(r"\s*\"?sep=(.)\"?[\s;,]*", "".join(text[first : first + 1]))
-        for k in range(skip, len(text) if wanted else 0):
+        for k in lines if wanted else ():
             delimiter = said[1] if said else _delimiter(text[k])
             header = _cells(text[k].lstrip("# "), delimiter)
             if wanted <= {heading(cell)[0] for cell in header}:
                 return cls(path, text, delimiter, header, k + 1)
-        return cls(path, text, said[1] if said else _delimiter(text[first]), [], first + 1 if said else skip)
+        told = said[1] if said else _delimiter(text[next((k for k in lines if _has_number(text[k])), first)])
+        return cls(path, text, told, [], first + 1 if said else skip)
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Yield the number of each line that has a cell, and its cells. Raises InputError."""
-        reader = csv.reader(islice(self.text, self.start, None), delimiter=self.delimiter)
+        reader, last = csv.reader(islice(self.text, self.start, None), delimiter=self.delimiter), 0
         try:
             for cells in reader:
+                if reader.line_num > last + 1 and any(self.delimiter in cell for cell in cells):
+                    first, open_until = self.start + last + 1, f"line {self.start + reader.line_num}"
+                    allowed = f"no quotation mark that is open until {open_until}"
+                    raise InputError.one(self.path, f"line {first}", self.text[first - 1], allowed)
+                last = reader.line_num
                 texts = [cell.strip().replace("\u2212", "-") for cell in cells]
                 comment = texts[:1] and texts[0].split()[:1] == ["#"] and not any(texts[1:])
                 if any(text.strip(";,") for text in texts) and not comment:
@@ -179,13 +192,19 @@ def read_columns(
 def _read(table: Cells, headings: Mapping[str, str], options: TableOptions, read: Rows) -> None:
     there, listed = [heading(cell) for cell in table.header], ", ".join(headings.values())
     names = [name for name, _ in there]
-    wanted = [heading(text)[0] for text in headings.values()]
     twice = [word for word in WORDS if names.count(word) > 1]
-    if twice or any(names.count(name) != 1 for name in wanted):
+    alike = [_plain(cell) for cell in table.header]
+    places = [
+        [k for k in range(len(names)) if alike[k] == _plain(text)]  # one that is named with its unit
+        if alike.count(_plain(text)) == 1 and heading(text)[1]
+        else [k for k in range(len(names)) if names[k] == heading(text)[0]]
+        for text in headings.values()
+    ]
+    if twice or any(len(place) != 1 for place in places):
         line = table.start + (not table.header)
         allowed = f"a header line with the columns {', '.join([listed, *twice])}, once each"
         raise InputError.one(table.path, f"line {line}", table.text[line - 1], allowed)
-    columns = [names.index(name) for name in wanted]
+    columns = [place for (place,) in places]
     words = {word: names.index(word) for word in WORDS if word in names}
     scales = [UNITS.get(name, LENGTHS) for name in headings]
     mark = table.decimal_mark(columns)
@@ -266,9 +285,9 @@ def heading(cell: str) -> tuple[str, str]:
     """The name and the unit of a heading, both in small letters; the unit may be empty."""
     text = _plain(cell)
     parts = HEADING.fullmatch(text)
-    if not parts or not (name := parts[1] or parts[3]):
+    if not parts or not (name := parts[1] or parts[3] or parts[5]):
         return text, ""
-    unit = parts[2] or parts[4] or parts[5] or ""
+    unit = parts[2] or parts[4] or parts[6] or ""
     return (name if unit in LENGTHS or name in UNITS else text), unit
 
 
@@ -285,6 +304,11 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 def _is_content(line: str) -> bool:
     return bool(line.strip(" ;,\t")) and not line.lstrip().startswith("#")
+
+
+def _has_number(line: str) -> bool:
+    cells = (cell.strip() for cell in _cells(line, _delimiter(line)))
+    return any(not math.isnan(number(cell, mark)[0]) for cell in cells for mark in OTHER)
 
 
 def _delimiter(line: str) -> str:

@@ -140,9 +140,14 @@ def checked(
 
 def _wrong_kinds(data: Mapping[str, Any]) -> Faults:
     for key, values in data.items():
-        if values.dtype.kind not in "fiub" or (key in "KA" and values.ndim != 2):
+        sides = sum(side > 1 for side in values.shape)
+        if values.dtype.kind not in "fiub" or (
+            values.ndim != 2 if key in "KA" else key in "fg" and sides > 1
+        ):
             found = f"{values.dtype} array of shape {values.shape}"
-            yield key, key, found, "real numbers; K and A must be matrices"
+            yield key, key, found, "real numbers; K and A must be matrices, f and g vectors"
+        elif np.ma.is_masked(values):
+            yield key, key, "a masked array", "a number in each place; some are masked"
 
 
 def _wrong_entries(K: sp.csr_array, A: sp.csr_array, f: Vector, g: Vector, nodes: Matrix | None) -> Faults:

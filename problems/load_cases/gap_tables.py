@@ -6,6 +6,7 @@ or parts of decimal numbers. A first column that counts its rows, or whose headi
 """
 
 import re
+from collections.abc import Sequence
 from itertools import chain, islice
 from math import isnan
 from pathlib import Path
@@ -23,13 +24,15 @@ NOTHING = re.compile(r"#\D.*|n/?a|nan|null|-*", re.IGNORECASE)  # where a gap is
 QUICK = re.compile(r"[-+.\deE]+", re.ASCII)
 
 
-def read_gaps(path: Path, m: int, mib: float, options: TableOptions = AS_NAMED) -> Matrix:
-    """(rows, columns) mm, NaN where a gap is missing. Raises InputError."""
+def read_gaps(
+    path: Path, m: int, mib: float, options: TableOptions = AS_NAMED, labels: Sequence[int] = ()
+) -> Matrix:
+    """(rows, columns) mm, NaN where a gap is missing; labels : the contacts' nodes. Raises InputError."""
     table = Cells.of(path, mib, ())
     rows = table.rows()
     first = list(islice(rows, FIRST))
-    names = _header(path, first, m)
-    unit = LENGTHS[_unit(path, names)]
+    names = _header(path, first, m, labels)
+    unit = LENGTHS[_unit(path, names[-m:])]
     mark, values = table.decimal_mark(range(2 * m + 2)), []
     for line, row in chain(first, rows):
         cells = _trimmed(row, m)
@@ -52,7 +55,7 @@ def _trimmed(cells: list[str], m: int) -> list[str]:
     return cells
 
 
-def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
+def _header(path: Path, rows: list[tuple[int, list[str]]], m: int, labels: Sequence[int]) -> list[str]:
     """The header, taken from the first rows with a row of units below it, which is added to the names."""
     names: list[str] = []
     while len(rows) > 1 and rows[0][1][0].startswith("# ") and not any(map(_is_number, rows[1][1])):
@@ -68,18 +71,20 @@ def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
         names = [f"{cell} [{unit}]" for cell, unit in zip(names, units, strict=False)]
     numbers = [int(digits[-1]) for name in names[-m:] if (digits := re.findall(r"\d+", name))]
     counts = [list(range(m)), list(range(1, m + 1))]
-    if sorted(numbers) in counts and numbers not in counts:
-        allowed = f"columns of the contacts 0 to {m - 1} in this order"
+    orders = [*counts, list(labels)]
+    if numbers not in orders and sorted(numbers) in map(sorted, orders):
+        like = next(order for order in orders if sorted(order) == sorted(numbers))
+        allowed = f"columns of the contacts {like[0]} to {like[-1]} in this order"
         raise InputError.one(path, "header", ", ".join(names), allowed)
     line, cells = (rows[0][0], _trimmed(rows[0][1], m)) if rows else (0, [])
-    labels = [number(cell, ".")[0] for cell in cells[-m:]]
-    whole = len(labels) == m and all(cell.isascii() and cell.isdigit() for cell in cells[-m:])
-    counting = m > 2 and not names and labels in counts
+    values = [number(cell, ".")[0] for cell in cells[-m:]]
+    whole = len(values) == m and all(cell.isascii() and cell.isdigit() for cell in cells[-m:])
+    counting = m > 2 and not names and values in counts
     fractions = any({*cell} & {*".,"} for _, row in rows[1:] for cell in row)
     if counting and whole and fractions:
         del rows[0]
         return cells
-    if counting or (whole and (not names or (fractions and max(labels) > PLAUSIBLE))):
+    if counting or (whole and (not names or (fractions and max(values) > PLAUSIBLE))):
         allowed = "a header or gaps? Delete a header; write one of letters above gaps, with decimal marks"
         raise InputError.one(path, f"line {line}", ", ".join(cells[:5]), allowed)
     return names
@@ -90,11 +95,14 @@ def _is_number(cell: str) -> bool:
 
 
 def _unit(path: Path, names: list[str]) -> str:
-    """The unit of the headings. Raises InputError if they have several, or one that is no length."""
-    names = [f"gap [{name}]" if name.lower() in LENGTHS else name for name in names]
-    units = sorted({heading(name)[1] for name in names} - {"", "-"})
-    if len(units) > 1 or any(unit not in LENGTHS for unit in units):
-        allowed = f"one unit of length: {', '.join(filter(None, LENGTHS))}"
+    """The unit of the contacts' headings; a unit alone is a name, unless all headings are units.
+
+    Raises InputError if they have several units, or one that is no length.
+    """
+    alone = all(name.lower() in LENGTHS for name in names)
+    units = sorted({name.lower() if alone else heading(name)[1] for name in names})
+    if len({LENGTHS.get(unit, unit) for unit in units}) > 1 or not LENGTHS.keys() >= {*units}:
+        allowed = f"one unit of length for all contacts: {', '.join(filter(None, LENGTHS))}"
         raise InputError.one(path, "header, unit", ", ".join(units), allowed)
     return units[0] if units else ""
 

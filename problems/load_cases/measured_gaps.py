@@ -82,7 +82,9 @@ def measured_gaps(
     effects = scene.effects if isinstance(scene, JointScene) else ()
     forces = load_case(scene, form, [effect for effect in effects if not isinstance(effect, GapEffect)])
     m = len(forces.g)
-    gaps = _read(regular_file(path, "file", TABLE_MIB), m, options)
+    ids = scene.joint.ids if isinstance(scene, JointScene) else None
+    labels = [] if ids is None else ids[1].tolist()
+    gaps = _read(regular_file(path, "file", TABLE_MIB), m, options, labels)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
         allowed = f"one row per case, one column for each of {m} contacts"
         raise InputError.one(path, "shape", gaps.shape, allowed)
@@ -138,12 +140,12 @@ def _refuse_infinite(path: Path, gaps: Matrix) -> None:
         raise InputError.one(path, f"case {case[0]}, contact {contact[0]}", value, allowed)
 
 
-def _read(path: Path, m: int, options: TableOptions) -> Matrix:
+def _read(path: Path, m: int, options: TableOptions, labels: Sequence[int]) -> Matrix:
     suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     try:
         match suffix:
             case ".csv":
-                return read_gaps(path, m, TABLE_MIB, options)
+                return read_gaps(path, m, TABLE_MIB, options, labels)
             case ".npy":
                 gaps: Matrix = np.load(path, mmap_mode="r")
             case ".npz":

@@ -127,6 +127,18 @@ def test_plain_arrays_are_copied_and_checked() -> None:
         solve_dual(Q, p, "newtom")
 
 
+def test_masked_values_are_no_numbers() -> None:
+    g = np.ma.masked_equal([0.2, -1.0], -1.0)
+    scene = own_matrices(np.eye(2), np.eye(2), [1.0, 1.0], np.ma.masked_equal([0.2, 0.3], -1.0))
+    for refused in (
+        lambda: own_matrices(np.eye(2), np.eye(2), [1.0, 1.0], g),
+        lambda: judge(scene, g),
+        lambda: list(solve_series(scene, [LoadCase([1.0, 1.0], g)])),
+    ):
+        with pytest.raises(InputError, match="a number in each place; some are masked"):
+            refused()
+
+
 class Idle(Solver):
     """Gives λ = 0, or what it is told to give."""
 

@@ -170,6 +170,12 @@ def test_tables_of_solve_are_answers(scenes: Path, tmp_path: Path, monkeypatch: 
     assert harness("solve", scenes / "strip.toml", "--out", tmp_path).exit_code == 0
     for name in ("nodes.csv", "contacts.csv", "solution.npz"):
         assert harness("judge", tmp_path / name, scenes / "strip.toml").exit_code == 0
+    header, *lines = (tmp_path / "nodes.csv").read_text().splitlines()
+    (tmp_path / "nodes.csv").write_text(
+        "\n".join([header, *sorted(lines, key=lambda line: line.split(",")[-1])])
+    )
+    done = harness("judge", tmp_path / "nodes.csv", scenes / "strip.toml")
+    assert (done.exit_code, "rows in its order" in done.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(
@@ -194,6 +200,11 @@ BAD: dict[str, tuple[Any, int, str]] = {
     "heading.csv": ("a,b\n1,2\n", 2, "displacement_mm"),
     "ragged.csv": ("x,lam\n1,2\n1\n", 2, "numbers"),
     "permuted.csv": ("node,x\n" + "".join(f"{k},0\n" for k in range(20, 0, -1)), 2, "an index that ascends"),
+    "index.csv": (
+        "part,index,x\n" + "".join(f"a,{k},0\n" for k in range(20, 0, -1)),
+        2,
+        "column 2 = 'index'",
+    ),
     "decimal.csv": ("i,x,\n" + "0,1,5\n" * 20, 2, "one for each heading"),
     "row.csv": ("x\n" + "0\n" * 20 + "#N/A\n", 2, "line 22"),
     "coordinate.csv": ("x,y,displacement_mm\n" + "0,0,0\n" * 20, 2, "one of them alone"),

@@ -115,6 +115,18 @@ def test_text_of_any_program(form: str) -> None:
         (b"1,3,1,3,4.0\n2,3,2,3,1.e36\n", "K.mtx", "node 2, dof 3.*a degree of freedom that is held"),
         (b"-1,3,-1,3,4.0\n1,3,1,3,3.0\n", "K.mtx", "= -1: 1 or more"),
         (b"1,1,4.0\n4,4,3.0\n", "K.mtx", "row 2"),
+        (b"2000000001,2000000001,4.0\n", "K.mtx", "row 1"),
+        (
+            b"DMIG,K,0,6,2,0\nDMIG,K,1,0,,1,0,4.,,2,0,-1.\nDMIG,K,2,0,,2,0,3.\n",
+            "K.pch",
+            "line 2 .* at most 8 ",
+        ),
+        (b"DMIG,K,0,9,2,0\nDMIG,K,99999999,0,,1,0,1.0\n", "K.pch", "K, column 1 = None: .* 1 … 99999999"),
+        (
+            b"%%MatrixMarket matrix coordinate integer general\n1 1 1\n1 1 4.0\n",
+            "K.mtx",
+            "whole numbers, none",
+        ),
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,\n,2,,-1\n", "K.pch", "point 2, component 0.*cut off"),
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,0\n", "K.pch", "line 2 = '0'"),
         (b"DMIG,K,0,6,2,0\nINCLUDE 'f.pch'\n", "K.pch", "line 2 = .INCLUDE .*not followed"),
@@ -195,6 +207,22 @@ def test_arrays_beside_a_problem_are_refused_or_said() -> None:
     with pytest.raises(InputError, match=r"lb = .* a bound is a column of A") as error:
         read_matrices({"problem": Path("mine.npz")})
     assert len(error.value.faults) == 2
+    parts = {f"K_{part}": getattr(sp.csc_array(K), part) for part in ("data", "indices", "indptr", "shape")}
+    np.savez("mine.npz", **problem, **parts)
+    with pytest.raises(InputError, match=r"K = .*one of the two: the matrix alone, or its four parts"):
+        read_matrices({"problem": Path("mine.npz")})
+
+
+def test_a_load_is_a_vector() -> None:
+    problem = {"K": np.eye(6), "A": np.eye(6, 2), "f": np.ones((6, 1)), "g": np.ones((1, 2))}
+    assert checked(problem, {})[1].f.shape == (6,)
+    np.savez("mine.npz", **problem | {"f": np.ones((2, 3))})
+    for refused in (
+        lambda: read_matrices({"problem": Path("mine.npz")}),
+        lambda: import_matrices(["mine.npz"], "o.npz"),
+    ):
+        with pytest.raises(InputError, match=r"f = .*\(2, 3\).*f and g vectors"):
+            refused()
 
 
 def test_a_large_sparse_K_is_one_in_any_spelling() -> None:

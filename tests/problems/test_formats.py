@@ -163,6 +163,11 @@ def test_a_name_picks_its_matrix_from_a_file_of_several(tmp_path: Path) -> None:
     found = np.load(tmp_path / "out.npz")
     np.testing.assert_array_equal(found["f"], two["f"])
     np.testing.assert_array_equal(found["K"], one["K"].toarray())
+    others = [f"{name}={tmp_path / 'two.op4'}" for name in "Af"]
+    with pytest.raises(InputError, match="g = None: is in none"):
+        import_matrices([f"{tmp_path / 'one.npz'}:K", *others], tmp_path / "out.npz")
+    with pytest.raises(InputError, match="matrix = 'Q': K, A, f, g or nodes"):
+        import_matrices([f"{tmp_path / 'one.npz'}:Q"], tmp_path / "out.npz")
     np.savez(tmp_path / "none.npz", stiffness=np.eye(2), mass=np.eye(2))
     with pytest.raises(InputError, match="a matrix K, or one matrix alone"):
         import_matrices([f"K={tmp_path / 'none.npz'}"], tmp_path / "out.npz")

@@ -11,6 +11,7 @@ from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.effects.fasteners import Fasteners
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
+from problems.input.tables import read_columns
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.stream import Stream
 from problems.model.fastener_forces import fastener_forces
@@ -34,6 +35,12 @@ def scene_of(folder: Path, effect: str, holes: str) -> JointScene:
     return scene
 
 
+def test_a_heading_that_begins_alike_is_another_column(tmp_path: Path) -> None:
+    (tmp_path / "holes.csv").write_text("x,y,preload,preload_tool,preloaded\n10,20,300,7,yes\n")
+    read = read_columns(tmp_path / "holes.csv", ("x", "y", "preload"))
+    assert (read.rows, read.faults) == ([(10.0, 20.0, 300.0)], [])
+
+
 def table(heading: str = "preload", factor: float = 1.0) -> str:
     return f"x,y,{heading}\n" + "".join(f"{x},{y},{factor * force}\n" for x, y, force in HOLES)
 
@@ -41,7 +48,12 @@ def table(heading: str = "preload", factor: float = 1.0) -> str:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     ("heading", "factor", "columns"),
-    [("preload", 1.0, ""), ("Preload [kN]", 1e-3, ""), ("F1", 1.0, 'columns = { preload = "F1" }')],
+    [
+        ("preload", 1.0, ""),
+        ("Preload [kN]", 1e-3, ""),
+        ("preload in kN", 1e-3, ""),
+        ("F1", 1.0, 'columns = { preload = "F1" }'),
+    ],
 )
 def test_forces_are_the_sum_of_each(
     tmp_path: Path, kind: type[Fasteners], heading: str, factor: float, columns: str

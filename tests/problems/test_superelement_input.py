@@ -10,6 +10,7 @@ from superelements import Array, Tables, flat, scene_from, solved, write_nodes, 
 
 from problems.build import prepared
 from problems.errors import Fault, InputError
+from problems.load_cases.measured_gaps import measured_gaps
 
 X, Y = (each.ravel() for each in np.meshgrid(np.linspace(0, 100, 6), np.linspace(0, 50, 4)))
 NODES = flat(np.column_stack([X, Y]))
@@ -168,6 +169,18 @@ def test_a_node_far_from_all_others_is_told(tmp_path: Path) -> None:
     (said,) = scene_from(two(tmp_path, xyz=xyz)).unusual
     assert "part.b, nodes far from all others = 1" in said
     assert said.endswith("Ids 6")
+
+
+def test_columns_of_gaps_named_by_nodes_are_in_the_order_of_the_contacts(tmp_path: Path) -> None:
+    parts = [write_part(tmp_path, name, HELD, NODES, id=np.arange(len(NODES)) + 101) for name in "ab"]
+    scene = scene_from(parts)
+    ids = scene.joint.ids[1].tolist()
+    row = ",".join(f"0.{k}" for k in ids)
+    (tmp_path / "g.csv").write_text(",".join(f"n{k}" for k in ids) + f"\n{row}\n")
+    assert measured_gaps(scene, tmp_path / "g.csv").gaps.tolist() == [[float(f"0.{k}") for k in ids]]
+    (tmp_path / "g.csv").write_text(",".join(f"n{k}" for k in reversed(ids)) + f"\n{row}\n")
+    with pytest.raises(InputError, match=f"contacts {ids[0]} to {ids[-1]} in this order"):
+        measured_gaps(scene, tmp_path / "g.csv")
 
 
 def test_feet_that_change_places(tmp_path: Path) -> None:

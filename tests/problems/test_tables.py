@@ -61,6 +61,8 @@ def test_the_same_points(name: str, tmp_path: Path) -> None:
         ("x,y,gap\n0,0,1\n#N/A,#N/A,#N/A\n", "line 3", "a finite number"),
         ("x,y,gap\n0,0,1\n1,0,1e36\n", "line 3", "a finite number up to 1e+15"),
         ("x,y,gap [px]\n0,0,1\n", "line 1", "x, y, gap"),
+        ('x,y,gap,remark\n0,0,1,ok\n1,0,2,"\n2,0,3,"\n', "line 3", "open until line 4"),
+        ('x,y,gap,remark\n0,0,1,"left\n1,0,2,\n2,0,3,', "line 2", "open until line 4"),
         ("x,y,gap\n0,0,1 mm\n", "line 2", "a finite number"),
         *(
             (f"x,y,gap\n0,0,1\n{cell},0,2\n", "line 3", "a finite number")
@@ -131,6 +133,7 @@ def test_a_header_is_no_case(name: str, index: bool, german: bool, tmp_path: Pat
         (";".join(["1.250"] * 9), "line 1 .* may be 1250"),
         (",".join(["1_0"] * 8 + ["1.5"]), "line 1 .* a finite number"),
         (",".join(f"c{k} [px]" for k in range(9)) + "\n" + ROW, "one unit of length"),
+        (",".join(f"p{k}_{'in' if k % 2 else 'out'}" for k in range(9)) + "\n" + ROW, "one unit of length"),
         (ROW + ",0.25", r"shape = \(1, 10\)"),
     ],
 )
@@ -138,6 +141,34 @@ def test_gaps_that_may_be_something_else(text: str, words: str, tmp_path: Path) 
     (tmp_path / "g.csv").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
         measured_gaps(make_scene(JOINT), tmp_path / "g.csv")
+
+
+def test_a_letter_among_letters_is_no_unit(tmp_path: Path) -> None:
+    for names, size in (("E,F,G,H,I,J,K,L,M", 1.0), (",".join("m" * 9), 1000.0)):
+        (tmp_path / "g.csv").write_text(f"{names}\n{ROW}\n")
+        cases = measured_gaps(make_scene(JOINT), tmp_path / "g.csv")
+        np.testing.assert_array_equal(cases.gaps, np.full((1, 9), 0.25 * size))
+
+
+def test_a_title_tells_no_separator(tmp_path: Path) -> None:
+    """Semicolons and decimal commas below a title of one cell."""
+    lines = ["Report 7", ";".join(f"K{k}" for k in range(9)), ";".join(["0,25"] * 9)]
+    (tmp_path / "g.csv").write_text("\n".join(lines))
+    cases = measured_gaps(make_scene(JOINT), tmp_path / "g.csv")
+    np.testing.assert_array_equal(cases.gaps, np.full((1, 9), 0.25))
+
+
+def test_headings_are_as_many_as_columns_and_differ(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("Nr,X,Y,Gap,X [in]\n1,10,5,.1,9\n2,40,5,.2,9\n")
+    for columns in (("Nr", "X", "Y", "Gap"), ("X", "X", "Gap"), ("X", " x ", "Gap"), ("X", "Y")):
+        (fault,) = read_columns(tmp_path / "t.csv", COLUMNS, TableOptions(columns)).faults
+        assert "a heading for each of x, y, gap" in fault.allowed
+    assert read_columns(tmp_path / "t.csv", ("x", "y"), TableOptions(("X [in]", "Y", "Gap"))).rows == [
+        (228.6, 5.0),
+        (228.6, 5.0),
+    ]
+    (fault,) = read_columns(tmp_path / "t.csv", ("x", "y")).faults
+    assert "once each" in fault.allowed
 
 
 SCENE = make_scene(JOINT)
