@@ -5,6 +5,7 @@ listed if they agree; where it does not, a triangle alone is refused. |K_ij − 
 """
 
 import re
+import warnings
 from collections.abc import Callable, Sequence
 from io import BytesIO
 from itertools import islice
@@ -73,7 +74,9 @@ def read_entries(
         return np.zeros((0, count), dtype=np.int64), np.zeros(0), str
     dtype = np.dtype([*[("places", np.int64, (count,))][:count], ("values", kind)])
     try:
-        rows = np.loadtxt(BytesIO(body), dtype, comments=None, ndmin=1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # NumPy before 2.3 reads 1.5 as 1
+            rows = np.loadtxt(BytesIO(body), dtype, comments=None, ndmin=1)
     except ValueError as error:  # it says "row 0, column 3", but "row 1;" of the first row if it has too few
         k, sign = re.findall(r" row (\d+)([,;])", str(error))[0]
         key, line = line_of(int(k) - (sign == ";"))
