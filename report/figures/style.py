@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 BLUE, VERMILLION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, ORANGE, BLACK, GREY = "#56B4E9", "#E69F00", "#000000", "#7F7F7F"
-ROSE, INDIGO, BROWN, PINK, CYAN = "#AA4466", "#332288", "#661100", "#FA9FB5", "#33BBEE"
-OLIVE, MUSTARD = "#999933", "#B2B259"
+ROSE, INDIGO, BROWN, PINK = "#AA4466", "#332288", "#661100", "#FA9FB5"
+MUSTARD = "#B2B259"
 
 WIDTH = 9.0  # inches; at 100 pixels per inch the width of a page of text on a screen
 DPI = 160
@@ -46,7 +46,7 @@ FIXED = {
     "mprgp": (INDIGO, "v"),
     "nnls": (BROWN, "d"),
     "l-bfgs-b": (PINK, "H"),
-    "projected-gauss-seidel": (CYAN, "8"),
+    "projected-gauss-seidel": (SKY, "8"),
     "textbook-active-set": (MUSTARD, "<"),
     "piqp": (GREEN, "D"),
     "proxqp": (PURPLE, "P"),
@@ -60,7 +60,7 @@ FIXED = {
 SPARE = [
     (color, marker)
     for marker in "dvH8oshpDPX<>"
-    for color in (GREY, OLIVE, BLUE, ORANGE, VERMILLION, SKY, GREEN, PURPLE, CYAN, ROSE, INDIGO, BROWN)
+    for color in (GREY, BLUE, ORANGE, VERMILLION, SKY, GREEN, PURPLE, ROSE, INDIGO, BROWN)
     if (color, marker) not in FIXED.values()
 ]
 #: Marker size, tint (0: the full colour, 1: white) and filled part of the marker of a solver's first,

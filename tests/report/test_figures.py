@@ -51,6 +51,9 @@ def test_any_number_of_solvers_look_different_and_keep_their_looks() -> None:
     pairs = style.looks(names)
     assert len(set(pairs.values())) == len(names)
     assert all(pair not in style.FIXED.values() for pair in (style.looks(["mine-1"])["mine-1"], *style.SPARE))
+    alike = combinations([*style.FIXED.values(), *style.SPARE], 2)
+    colours = [(to_rgb(one), to_rgb(other)) for (one, mark), (other, same) in alike if mark == same]
+    assert min(np.linalg.norm(np.subtract(*pair)) for pair in colours) > 0.2
     fixed = {name: pairs[name] for name in style.FIXED}
     assert fixed == style.FIXED
 
