@@ -20,13 +20,15 @@ LEFT_OUT = ("seconds", "status")  # for whole lines on a terminal
 
 def compare(
     old: Annotated[str, typer.Argument(metavar="OLD", help="Directory that `run` wrote.")],
-    new: Annotated[list[str], typer.Argument(metavar="NEW...", help="Those to compare with it.")],
+    new: Annotated[list[str], typer.Argument(metavar="NEW...", help="Runs to compare with OLD.")],
     max_digits_lost: Annotated[float, option("N", "Digits of the error that may be lost.", min=0.0)] = 1.0,
     max_slowdown: Annotated[
         float | None, option("FACTOR", "Ratio of times that is allowed.  [default: 1.3]", min=1.0)
     ] = None,
     key: Annotated[str | None, option("KEY", "Only the row with this key.")] = None,
-    out: Annotated[Path | None, option("DIR", "Write comparison.md and comparison.csv there.")] = None,
+    out: Annotated[
+        Path | None, option("DIR", "Write comparison.md, its tables and index.html there.")
+    ] = None,
 ) -> None:
     """Compare runs, measurement by measurement; what became worse comes first.
 

@@ -61,8 +61,12 @@ Cases = Annotated[
 ]
 Seed = Annotated[int | None, option("SEED", "Seed of the random gaps.  [default: 0]", min=0)]
 Mean = Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")]
-Spread = Annotated[float | None, option("MM", "Their standard deviation.  [default: the scene's]")]
-Length = Annotated[float | None, option("MM", "Their correlation length.  [default: the scene's]")]
+Spread = Annotated[
+    float | None, option("MM", "Standard deviation of the random gaps.  [default: the scene's]")
+]
+Length = Annotated[
+    float | None, option("MM", "Correlation length of the random gaps.  [default: the scene's]")
+]
 Around = Annotated[
     Path | None, option("FILE", "A scan, CSV with x, y, gap in mm, that the random gaps pass through.")
 ]
@@ -74,7 +78,7 @@ Scans = Annotated[
     str | None, option("FILES", "Scans of many joints, as 'scans/*.csv': gaps vary by their principal modes.")
 ]
 Variance = Annotated[
-    float | None, option("SHARE", "Of the scans' variance that the modes keep.  [default: 0.99]")
+    float | None, option("SHARE", "Share of the scans' variance that the modes keep.  [default: 0.99]")
 ]
 Random = Annotated[
     list[str] | None,
@@ -92,9 +96,15 @@ Scheduler = Annotated[
 
 Share = Annotated[
     float | None,
-    option("SHARE", "Of the cases that must keep the limits.  [default: 0.95; of one, 1]", min=0.01),
+    option(
+        "SHARE",
+        "Share of the cases that must keep the limits.  [default: 0.95; 1 of a single case]",
+        min=0.01,
+    ),
 ]
-Resolution = Annotated[float | None, option("SHARE", "Of the range that is told apart.  [default: 0.01]")]
+Resolution = Annotated[
+    float | None, option("SHARE", "Step between values, as a share of the range.  [default: 0.01]")
+]
 
 
 def _load_cases(

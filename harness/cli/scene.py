@@ -126,7 +126,8 @@ def init(
         typer.Argument(metavar="[FILE]", help="The scene to write.  [default: joint.toml]"),
     ] = None,
     superelements: Annotated[
-        bool, typer.Option("--superelements", help="Of the parts whose K is in the other FILEs.")
+        bool,
+        typer.Option("--superelements", help="Write a scene of superelements; the other FILEs hold their K."),
     ] = False,
 ) -> None:
     """Write a commented scene to start from: a joint of two sheets, a gap, fasteners; or of your own parts.
