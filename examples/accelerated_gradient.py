@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from harness import Answer, DualLoadCase, Solver, check_solver, solve
+from rivetbench import Answer, DualLoadCase, Solver, check_solver, solve
 
 
 class Fista(Solver):

@@ -13,7 +13,7 @@ Prints the largest error of x, mm, that the judge finds for ρ = 1e6 N/mm.
 
 import numpy as np
 
-from harness import judge, own_matrices
+from rivetbench import judge, own_matrices
 
 
 def joint(n: int = 40) -> tuple[np.ndarray, ...]:

@@ -13,7 +13,7 @@ Prints the sum of the contact forces, N.
 import numpy as np
 import scipy.linalg as sla
 
-from harness import own_matrices, solve, solve_dual
+from rivetbench import own_matrices, solve, solve_dual
 
 N = 50
 

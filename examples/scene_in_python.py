@@ -8,7 +8,7 @@ gap to the tool, f the preload of three fasteners, 80 N each. The tool carries �
 Prints Σλ, N, from the certified reference.
 """
 
-from harness import load_scene, solve
+from rivetbench import load_scene, solve
 
 SHEET = {
     "junction": {"length": 600.0, "width": 150.0, "nodes": [25, 7]},

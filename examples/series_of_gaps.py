@@ -8,7 +8,7 @@ Prints the mean over the cases of the largest remaining gap, mm.
 
 import numpy as np
 
-from harness import load_scene, random_gaps, solve_series
+from rivetbench import load_scene, random_gaps, solve_series
 
 SCENE = {
     "joint": {

@@ -141,7 +141,7 @@ class Solver(ABC):
     The primal–dual active set, which starts from the contacts that overlap without forces:
 
     >>> import numpy as np
-    >>> from harness import solve
+    >>> from rivetbench import solve
     >>> from solvers.base import Answer, Solver
     >>> class ActiveSet(Solver):
     ...     forms = ("dual",)
