@@ -97,6 +97,7 @@ def series(
         from harness.commands.limit_search import tolerance as find_limit
         from harness.commands.load_case_series import run_series
         from harness.series.session import SeriesOptions
+        from harness.terminal import GAP_EXCEEDED
         from harness.terminal.console import ConsoleReporter, show_verdict
         from problems.errors import InputError
 
@@ -125,5 +126,6 @@ def series(
             console.print(f"Report: {outcome.report}")
         code = outcome.code
         if outcome.sentences:
-            code = show_verdict(outcome.kind, outcome.sentences, console) or code
+            shown = show_verdict(outcome.kind, outcome.sentences, console)
+            code = shown if shown == GAP_EXCEEDED else code or shown
         raise typer.Exit(code)

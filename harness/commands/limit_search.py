@@ -14,7 +14,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from math import ceil, inf
+from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +35,12 @@ from problems.load_cases.sweep import keys_of
 from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
+from report.document.numbers import out_of
 
 from .load_case_series import run_series
 
 RESOLUTION = 0.01  # of the range, by default
+OUTPUTS = ("report.md", "shares.csv", "shares.png")
 UNCHECKED = SeriesOptions(check=0)
 
 
@@ -137,12 +139,16 @@ def tolerance(
         allowed = "a share above 0, at most 1, a resolution from 1e-6 to 1, no --contributors"
         raise InputError.one("--find", "share, resolution", (share, resolution), allowed)
     refuse_unusable(allow_gap_mm)
-    refuse_inputs([directory / TOLERANCE], read.sources)
+    inputs = [*read.sources, *(Path(file) for file in (*cases.files, options.plugin) if file)]
+    refuse_inputs([directory / name for name in (TOLERANCE, *OUTPUTS)], inputs)
     key, grid = keys[name], np.linspace(low, high, ceil(1 / resolution - 1e-9) + 1)
     values = [float(f"{value:.10g}") for value in grid]
 
     def upper_bounds(value: float, seed: int | None = None) -> Vector:
-        """Bounds on the largest gap in each case at a value (N,) mm. seed : of fresh cases."""
+        """Bounds on the largest gap in each case at a value (N,) mm, NaN without an answer.
+
+        seed : of fresh cases.
+        """
         assert isinstance(read, JointScene)
         if wrong := key.faults(read, value, f"--find {name}"):
             raise InputError(wrong)
@@ -153,31 +159,33 @@ def tolerance(
         how["reporter"] = reporter if value == values[0] else SILENT
         how["allow_gap_mm"] = None if seed is None else allow_gap_mm
         run_series(replace(read, effects=tuple(effects)), folder, drawn, options, **how)
-        count = (series_file.read_facts(folder) or {})["cases"]
-        rows = [row for row in series_file.rows(folder) if row["case"] < count]
+        count, rows = (series_file.read_facts(folder) or {})["cases"], [*series_file.rows(folder)]
         if len(rows) < count:
             raise InputError.one(folder, "cases", len(rows), f"{count}: run the same command again")
         both = [(row.get("max_gap_mm"), row.get("gap_error_mm")) for row in rows]
-        return np.array([inf if gap is None or e is None else gap + e for gap, e in both])
+        return np.array([nan if gap is None else inf if e is None else gap + e for gap, e in both])
 
     bounds, shares = cache(upper_bounds), list[dict[str, float]]()
 
     @cache
     def kept(value: float, seed: int | None = None) -> int:
         """In how many cases a value keeps the limit."""
-        keeps = bounds(value, seed) <= allow_gap_mm
-        count, total = int(keeps.sum()), len(keeps)
+        largest = bounds(value, seed)
+        count, total = int((largest <= allow_gap_mm).sum()), len(largest)
+        missing = int(np.isnan(largest).sum())
         low, high = share_interval(count, total)
         figures = {"value": value, "cases": total, "kept": count, "share": count / total}
-        shares.append(figures | {"low": low, "high": high, "fresh": seed is not None})
+        shares.append(figures | {"low": low, "high": high, "fresh": seed is not None, "no_answer": missing})
         which = "cases" if seed is None else "fresh cases"
-        reporter.say(f"{name} = {value:g}: within {allow_gap_mm:g} mm in {count} of {total} {which}")
+        without = f", {missing} without an answer" if missing else ""
+        reporter.say(f"{name} = {value:g}: within {allow_gap_mm:g} mm in {count} of {total} {which}{without}")
         return count
 
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
-    with records.locked(directory, TOLERANCE), shared(scheduler, console_of(reporter)) as address:
+    lock = records.locked(directory, TOLERANCE, outputs=OUTPUTS)
+    with lock, shared(scheduler, console_of(reporter)) as address:
         first, last = (bounds(value, None) for value in (values[0], values[-1]))
-        if np.array_equal(first, last):
+        if np.array_equal(first, last, equal_nan=True):
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
         outcome, count = searched(kept, values, share, len(first)), len(first)
         limit = f"{allow_gap_mm:g} mm in {100 * share:g} % of the joints"
@@ -195,6 +203,9 @@ def tolerance(
             if outcome.passed or value == safe:
                 break
             value = values[(values.index(value) + values.index(safe) + rising) // 2]
+        if missing := sum(int(one["no_answer"]) for one in shares):
+            without = out_of(missing, count * len(shares), "case")
+            said.insert(1, f"Without an answer, and counted as too large a gap: {without} over all values.")
         outcome = replace(outcome, sentences=tuple(said))
         asked = {"find": find, "allowed_mm": allow_gap_mm, "share": share, "cases": count}
         records.replace_object(directory / TOLERANCE, asked | asdict(outcome))

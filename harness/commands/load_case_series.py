@@ -9,7 +9,7 @@ from typing import Any
 from harness.measurement.scheduler import threads_per_worker
 from harness.measurement.solver_descriptions import described
 from harness.planning.form_choice import chosen_form
-from harness.results import series_file
+from harness.results import records, series_file
 from harness.results.atomic_output import refuse_inputs, refuse_unwritable
 from harness.results.provenance import fingerprints
 from harness.results.records import Row, to_line
@@ -20,7 +20,7 @@ from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
 from harness.series.session import Job, SeriesOptions
 from harness.solving.call_lock import keeps_threads
-from harness.terminal import DONE, NOTHING_JUDGED
+from harness.terminal import DONE
 from harness.terminal.console import console_of
 from problems.errors import Fault, InputError
 from problems.load_cases import LoadCases
@@ -30,6 +30,7 @@ from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
 STANDARD = SeriesOptions()
+OUTPUTS = ("report", *series_file.CHECK_FILES)
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,9 @@ def run_series(
         raise InputError(faults)
     inputs = [*read.sources, *(Path(file) for file in (*cases.files, options.plugin) if file)]
     refuse_unwritable(directory, inputs)
-    refuse_inputs([directory / SERIES], inputs)
+    report_files = (directory / "report").glob("*")
+    refuse_inputs([*(directory / name for name in (SERIES, *OUTPUTS)), *report_files], inputs)
+    records.refuse_other_command(directory, SERIES, OUTPUTS)
     earlier = (series_file.read_facts(directory) or {}).get("identity", {}).get("form")
     wanted = options.form or (earlier if earlier in made.forms else None)
     alien = [*sweep, *([str(options.plugin)] if options.plugin else [])]
@@ -156,7 +159,7 @@ def run_series(
     facts = {"solver_version": made.version, "solver_code": made.code}
     code = run(job, facts, directory, console_of(reporter), scheduler)
     verdict: dict[str, Any] = {"kind": "", "said": []}
-    if allow_gap_mm is not None and code in (DONE, NOTHING_JUDGED):
+    if allow_gap_mm is not None and sum(1 for _ in series_file.rows(directory)) == chosen.count:
         verdict = check_series(directory, allow_gap_mm)
     path = None
     if report and (written := series_file.read_facts(directory)):

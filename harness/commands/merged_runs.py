@@ -34,7 +34,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
         raise Incomparable.one(" ".join(names), "key", place[0], f"one row of {place[1]}, not {count}")
     if (out / records.MEASUREMENTS).exists():
         raise InputError.one("--out", "directory", str(out), f"has rows: {records.OTHER}")
-    with records.locked(out, folders=("scenes",)):
+    with records.locked(out, folders=("scenes",), outputs=("report", SUITE)):
         for folder, side in zip(map(Path, names), sides, strict=True):
             of_machine = {"machine": side.rows[0].get("machine")}
             for file in sorted(folder.glob("machine*.json")):

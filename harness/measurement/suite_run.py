@@ -53,9 +53,14 @@ def run(
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite) if key is None else of_key(expand(suite), key)
-    with records.locked(directory, folders=("answers", "scenes", "logs")):
+    text, written = to_toml(suite), directory / "suite.toml"
+    other = (
+        written.is_file() and written.read_bytes() != text.encode()
+    )  # this command, interrupted, left the same
+    folders, outputs = ("answers", "scenes", "logs"), ("report", *["suite.toml"] * other)
+    with records.locked(directory, folders=folders, outputs=outputs):
         rows = resumed(directory, plan, solvers, console)
-        records.replace_text(directory / "suite.toml", to_toml(suite))
+        records.replace_text(written, text)
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)

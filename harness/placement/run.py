@@ -134,8 +134,9 @@ def place(
     source, directory = str(scene), Path(out)
     refuse_unusable(allow_gap_mm)
     inputs = [Path(file) for file in (scene, candidates, *cases.files) if file]
-    refuse_inputs([directory / name for name in OUTPUTS], inputs)
-    movable = MovableFasteners.of(read_scene(source))
+    read, report_files = read_scene(source), (directory / "report").glob("*")
+    refuse_inputs([*(directory / name for name in OUTPUTS), *report_files], [*read.sources, *inputs])
+    movable = MovableFasteners.of(read)
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
     single = cases.are_one(movable.bare)
     faults = cases.faults(table=None if candidates is None else str(candidates))
@@ -166,7 +167,7 @@ def place(
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
-    records.refuse_other_command(directory, records.PLANS, (*OUTPUTS, *SERIES))
+    records.refuse_other_command(directory, records.PLANS, (*OUTPUTS, *SERIES, "report"))
     if order.table:
         reporter.say(HELD_BACK)
     nodes = prepared(study.bare, form=form).assembly.contact_nodes

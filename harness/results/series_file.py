@@ -11,6 +11,7 @@ Cases are written in transactions: whatever ends the process, a case has its row
 import io
 import json
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from math import inf
@@ -31,17 +32,22 @@ from .schema import SERIES, VERDICTS
 Gaps = NDArray[np.float32]
 
 GAP = np.dtype("<f4")
-TABLES = """
-CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL);
-CREATE TABLE IF NOT EXISTS cases (number INTEGER PRIMARY KEY, row TEXT NOT NULL, gap BLOB);
-"""
+TABLES = (
+    "CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL)",
+    "CREATE TABLE IF NOT EXISTS cases (number INTEGER PRIMARY KEY, row TEXT NOT NULL, gap BLOB)",
+)
+ROWS = "SELECT number, row FROM cases WHERE number < ? ORDER BY number"
 WITHOUT_GAP = """
 SELECT number FROM cases
 WHERE (coalesce(length(gap), 0) != ? OR typeof(gap) != 'blob')
     AND json_extract(row, '$.verdict') != 'no_answer' LIMIT 1
 """
-DISK = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+DAMAGED = (sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+IN_USE = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+WAIT_S = 600.0  # for another program that reads the file
+RETRY_S = 1.0  # Ctrl-C is heard between two tries
 AGAIN = "delete it, and run the same `series` command again"
+CHECK, CHECK_FILES = "allowed_gap", ("allowed-gap.csv", "allowed-gap.png")  # among the facts; beside the file
 
 
 class Identity(BaseModel):
@@ -68,24 +74,42 @@ class Facts(BaseModel):
 
 
 @contextmanager
-def connected(directory: Path) -> Iterator[sqlite3.Connection]:
-    """A connection; a block that ends without an error is committed.
+def connected(directory: Path, mode: str = "DEFERRED") -> Iterator[sqlite3.Connection]:
+    """A connection in a transaction; a block that ends without an error is committed.
 
-    Raises InputError if the file is damaged or none of ours, OSError if the disk refuses.
+    mode : EXCLUSIVE to write. Raises InputError if the file is damaged or none of ours, OSError if the disk
+    refuses, or if another program keeps the file for longer than `WAIT_S`.
     """
     path = directory / SERIES
     if path.exists():
         regular_file(path, "content", inf)
     try:
-        with closing(sqlite3.connect(path)) as connection, connection:
-            connection.execute("SELECT count(*) FROM sqlite_master")  # undoes what was not finished
+        with closing(sqlite3.connect(path, timeout=RETRY_S)) as connection, connection:
+            _begin(connection, mode)
             if path.stat().st_size % connection.execute("PRAGMA page_size").fetchone()[0]:
                 raise InputError.one(path, "content", "cut off", AGAIN)
             yield connection
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # its message too
-        if getattr(error, "sqlite_errorcode", 0) & 0xFF in DISK:  # text that is not UTF-8 has none
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF  # text not UTF-8 has none
+        if code in IN_USE:
+            raise OSError(f"{path}: another program keeps it open: close that") from error
+        if code not in DAMAGED:
             raise OSError(f"{path}: {error}") from error
         raise InputError.one(path, "content", str(error), AGAIN) from error
+
+
+def _begin(connection: sqlite3.Connection, mode: str) -> None:
+    """Begin a transaction, once no other program is in the way: a reader stops a writer."""
+    until = time.monotonic() + WAIT_S
+    while True:
+        try:
+            connection.execute(f"BEGIN {mode}")
+            connection.execute("SELECT count(*) FROM sqlite_master")  # undoes what was not finished
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode & 0xFF not in IN_USE or time.monotonic() > until:
+                raise
+            connection.rollback()
 
 
 def _begun(path: Path) -> bool:
@@ -95,14 +119,15 @@ def _begun(path: Path) -> bool:
 
 def write_fact(directory: Path, name: str, value: str | bytes) -> None:
     """Write or replace a fact; the first one makes the tables."""
-    with connected(directory) as connection:
-        connection.executescript(TABLES)
+    with connected(directory, "EXCLUSIVE") as connection:
+        for table in TABLES:
+            connection.execute(table)
         connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", (name, value))
 
 
 def append(directory: Path, cases: Iterable[tuple[Row, Gaps | None]]) -> None:
     """Write rows with their gaps, all of them or none."""
-    with connected(directory) as connection:
+    with connected(directory, "EXCLUSIVE") as connection:
         connection.executemany(
             "INSERT OR REPLACE INTO cases VALUES (?, ?, ?)",
             ((row["case"], to_line(row), None if gap is None else gap.astype(GAP).tobytes())
@@ -130,12 +155,15 @@ def read_facts(directory: Path) -> dict[str, Any] | None:
 
 
 def rows(directory: Path) -> Iterator[Row]:
-    """The rows in the order of their numbers, one by one; none if there is no file."""
-    path = directory / SERIES
-    if not _begun(path):
+    """The rows of the series in the order of their numbers, one by one; none if there is no file.
+
+    Those that an earlier, longer series has left are passed over.
+    """
+    path, facts = directory / SERIES, read_facts(directory)
+    if facts is None:
         return
     with connected(directory) as connection:
-        for number, text in connection.execute("SELECT number, row FROM cases ORDER BY number"):
+        for number, text in connection.execute(ROWS, (facts["cases"],)):
             try:
                 row = json.loads(text)
                 whole = row["case"] == number and row["verdict"] in VERDICTS
@@ -155,7 +183,7 @@ def write_contacts(directory: Path, arrays: Mapping[str, Any]) -> None:
 
 def drop_gaps(directory: Path) -> None:
     """Keep the rows alone, in a smaller file."""
-    with connected(directory) as connection:
+    with connected(directory, "EXCLUSIVE") as connection:
         connection.execute("UPDATE cases SET gap = NULL")
         connection.commit()
         connection.execute("VACUUM")

@@ -18,6 +18,7 @@ import numpy as np
 
 from harness.results import series_file
 from harness.results.records import to_line
+from harness.results.series_file import CHECK
 from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
 from problems.model.effect import GapEffect
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
     from report.results.series_results import Series
 
-CHECK = "allowed_gap"  # in the facts of a series
 CONFIDENCE = 0.95  # of the interval for a share
 SHARE = 0.95  # of the cases that must keep a limit, by default
 ROUNDING = 2.0**-24
@@ -118,7 +118,7 @@ def _beyond_scan(scene: Scene, contacts: list[int]) -> str:
 
 
 def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
-    """The outcome for a series, recorded in it, with DIRECTORY/allowed-gap.csv and .png.
+    """The outcome for a series whose cases all have rows, recorded in it, with allowed-gap.csv and .png.
 
     kind : pass, fail, or "" where it cannot be told. said : sentences, the outcome last.
     """
@@ -128,28 +128,29 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
     series = read(directory)
     result = exceeding(series, allowed_mm)
     write(directory, series, allowed_mm, result.shares, result.largest)
-    answered, exceed = result.answered, len(result.cases)
-    within, cases = answered - exceed - result.undecided, counted(answered, "case")
+    answered, exceed, count = result.answered, len(result.cases), sum(series.counts.values())
+    within, cases = answered - exceed - result.undecided, counted(count, "case")
     sure = f"Surely within {allowed_mm:g} mm: {within} of {cases}"
     if answered and not series.swept:  # steps are no sample
-        free = exceeding(series.independent, allowed_mm)
-        kept = free.answered - len(free.cases) - free.undecided
-        low, high = share_interval(kept, free.answered)
+        free, per_point = exceeding(series.independent, allowed_mm), series.facts.get("cases_per_point", 1)
+        drawn = count * min(per_point, 2) // per_point  # answered or not
+        low, _ = share_interval(free.answered - len(free.cases) - free.undecided, drawn)
+        _, high = share_interval(drawn - len(free.cases), drawn)
         sure += f"; the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
-    kind, said = "" if result.undecided or not answered else "pass", [f"{sure}."]
-    if result.undecided:
-        precision = f"gaps are proven only to {result.uncertainty_mm:.1e} mm"
-        said.append(
-            f"In {result.undecided} of {cases} it cannot be told whether a gap is larger than {allowed_mm:g} "
-            f"mm: {precision}."
-        )
+    kind, said = "" if result.undecided or answered < count else "pass", [f"{sure}."]
+    untold = {f"gaps are proven only to {result.uncertainty_mm:.1e} mm": result.undecided}
+    untold["there is no answer"] = count - answered
+    for why, some in untold.items():
+        if some:
+            what = f"it cannot be told whether a gap is larger than {allowed_mm:g} mm: {why}"
+            said.append(f"In {some} of {cases} {what}.")
     if exceed:
         kind, worst, often = "fail", result.cases.iloc[0], int(np.argmax(result.shares))
         contacts = f"{np.count_nonzero(result.shares)} of {counted(len(result.shares), 'contact')}"
         at = "" if series.nodes is None else f", {position(series.nodes[often], series.nodes)}"
         said.append(
             f"FAIL: the gap is larger than {allowed_mm:g} mm in {exceed} of {cases} "
-            f"({exceed / answered:.1%}), at {contacts}, most often ({result.shares[often]:.1%}) at contact "
+            f"({exceed / count:.1%}), at {contacts}, most often ({result.shares[often]:.1%}) at contact "
             f"{often}{at}; the largest is {worst['max_gap_mm']:.3g} mm, in case {worst['case']:.0f}."
         )
     elif kind:

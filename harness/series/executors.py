@@ -65,37 +65,43 @@ def on_workers(
             yield outcome
 
 
-def solve_isolated(job: Job, numbers: Sequence[int]) -> Generator[list[Result], None, None]:
-    """The results as they come; the last ones say how the process ended, if that was before its time.
+def solve_isolated(
+    job: Job, numbers: Sequence[int], batched: bool = True
+) -> Generator[list[Result], None, None]:
+    """The results as they come; the last one says how the process ended, if that was before its time.
 
+    batched : whether cases may be solved at once; those that end the process are then tried one by one.
     Raises InputError if the plug-in cannot be imported or made.
     """
     proof_of(prepared(job.scene, form=job.form))  # builds what is not cached: without a limit
     running = list(numbers[:1])  # the cases that the plug-in is solving; before the first one, that one
     phases = {"opening the assembly": START_S, "solve": job.time_limit_s, "judging": START_S}
-    task = replace(job, cases=job.cases.only(numbers)), list(numbers)
+    task = replace(job, cases=job.cases.only(numbers)), list(numbers), batched
     with Monitored(solve_here, task, job.threads or 1, phases, job.memory_limit_mib) as process:
         for event in process:
             running = event.get("cases", running)
             if "row" in event:
+                running = [case for case in running if case != event["row"]["case"]]
                 gap = event["gap"]
                 yield [Result(event["row"], None if gap is None else np.array(gap, np.float32))]
     if faults := event.get("faults"):
         raise InputError([Fault(**fault) for fault in faults])
-    if "status" in event:
+    if "status" in event and len(running) > 1:
+        yield from solve_isolated(job, running, batched=False)
+    elif "status" in event:
         yield [Result(ended(job, case, event), None) for case in running]
 
 
-def solve_here(task: tuple[Job, Sequence[int]], events: Events) -> None:
+def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
     """The same, in the process of its own."""
-    job, numbers = task
+    job, numbers, batched = task
 
     def report(**event: Any) -> None:
         events.report(**event)
         if event["phase"] == "judging":
             stored.check()
 
-    session = SeriesSession(job, report=report)
+    session = SeriesSession(job, report=report, batched=batched)
     stored = StoredFiles(session.problem.arrays)
     for some in session.solve(numbers):
         for result in some:
@@ -111,6 +117,8 @@ def ended(job: Job, case: int, end: Row) -> Row:
         "message": end["message"],
         "verdict": "no_answer",
         "limit_mm": job.limit_mm,
+        "time_limit_s": job.time_limit_s,
+        "memory_limit_mib": job.memory_limit_mib,
         **provenance(),
     }
 

@@ -21,6 +21,12 @@ from problems.model.scene import JointScene, Scene
 from .staged import last_scene, refuse_staged_gaps
 
 RANDOM = 100  # cases, if no number is given
+#: The options for the field of the gap, and the keys that are the same.
+OF_FIELD = {
+    "--mean": "initial_gap.mean",
+    "--sd": "initial_gap.random.sd",
+    "--correlation-length": "initial_gap.random.correlation_length",
+}
 
 
 @dataclass(frozen=True)
@@ -122,9 +128,18 @@ class GapCases:
         """The load cases of a scene, of one with stages those of the last. stiffness : whether keys may
         change K.
 
-        Raises InputError, as `measured_gaps` and `random_gaps` do; or if gaps are drawn that a stage sets.
+        Raises InputError, as `measured_gaps` and `random_gaps` do; or if gaps are drawn that a stage sets, or
+        a number of their field is random and an option, too.
         """
         random, last, law = self.laws(scene), last_scene(scene), (self.mean, self.sd, self.correlation_length)
+        keys = {text.partition("=")[0].strip() for text in random}
+        faults = [
+            Fault(option, "mm", number, f"left out: {key} is random")
+            for (option, key), number in zip(OF_FIELD.items(), law, strict=True)
+            if number is not None and key in keys
+        ]
+        if faults:
+            raise InputError(faults)
         count, seed = self.count or RANDOM, self.seed or 0
         fields = scene.effects_of(InitialGap) if isinstance(scene, JointScene) else ()
         drawn = not random or self.around or law != (None, None, None) or any(one.random for one in fields)

@@ -25,7 +25,6 @@ from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
 from problems.errors import Fault, InputError
-from problems.load_cases import LoadCases
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from report.document.numbers import counted
@@ -35,6 +34,8 @@ from .session import Job, Result
 from .staged import last_scene
 
 MAX_FAULTS = 10  # named at once
+MISSING, OPEN, KEPT = range(3)  # a case: without a row, to be tried again, with its row
+LIMITS = {"time_limit": "time_limit_s", "memory_limit": "memory_limit_mib"}
 
 
 def run(
@@ -47,9 +48,10 @@ def run(
     """
     with records.locked(directory, SERIES):
         open_series(directory, identity(job) | facts, metadata(job))
-        done = solved(directory, job.cases)
-        remaining = sorted(np.flatnonzero(~done).tolist(), key=job.cases.stiffness_of)
-        cases, there = counted(len(done), "case"), len(done) - len(remaining)
+        state = states(directory, job)
+        remaining = np.flatnonzero(state < KEPT).tolist()
+        remaining.sort(key=lambda k: (job.cases.stiffness_of(k), state[k]))
+        cases, there = counted(len(state), "case"), len(state) - len(remaining)
         console.print(f"{job.scene.name}: {cases}, {there} already in {directory}")
         with shared(scheduler if remaining else None, console) as address:
             for _, some in groupby(remaining, job.cases.stiffness_of):
@@ -58,8 +60,7 @@ def run(
                 part = replace(job, scene=one_K[0], cases=one_K[1], key=uuid4().hex)  # another session
                 with results_of(part, numbers, address, console) as results:
                     solve_remaining(part, len(numbers), results, directory, console)
-        rows = (row for row in series_file.rows(directory) if row["case"] < job.cases.count)
-        return summary(rows, job.cases.count, console)
+        return summary(series_file.rows(directory), job.cases.count, console)
 
 
 def solve_remaining(
@@ -131,31 +132,44 @@ def record_contacts(job: Job, directory: Path) -> None:
 
 
 def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> None:
-    """Write identity and facts. Raises InputError, naming each difference, if another series is there."""
+    """Write identity and facts, without the check of an earlier command.
+
+    Raises InputError, naming each difference, if another series is there.
+    """
     before = series_file.read_facts(directory)
     if before is not None:
         records.refuse_other(directory / SERIES, before["identity"], identity)
     series_file.write_fact(directory, "series", to_line({"identity": identity, **facts}))
+    if series_file.CHECK in (before or {}):
+        for name in series_file.CHECK_FILES:
+            (directory / name).unlink(missing_ok=True)
 
 
-def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
-    """Tell which cases have a row, (count,).
+def states(directory: Path, job: Job) -> NDArray[np.int8]:
+    """MISSING, OPEN or KEPT for each case, (count,).
 
     Raises InputError if one has other parameters than its case now, as after a change of a table.
     """
-    done, faults = np.zeros(cases.count, dtype=bool), []
+    state, faults = np.full(job.cases.count, MISSING, dtype=np.int8), []
     for row in series_file.rows(directory):
         case = row["case"]
-        if case >= cases.count:
-            continue
-        done[case] = True
-        for name, value in cases.parameters(case).items():
+        state[case] = OPEN if is_open(row, job) else KEPT
+        for name, value in job.cases.parameters(case).items():
             if row.get(name) != value:
                 where, allowed = f"case {case}, {name}", f"is now {value!r}: {records.OTHER}"
                 faults.append(Fault(str(directory / SERIES), where, row.get(name), allowed))
     if faults:
         raise InputError(faults[:MAX_FAULTS])
-    return done
+    return state
+
+
+def is_open(row: Row, job: Job) -> bool:
+    """Whether a case without an answer is tried again: its limit is wider now, or memory ran out."""
+    status = row.get("status")
+    limit = LIMITS.get(status or "")
+    if limit:
+        return bool(row.get(limit, 0) < getattr(job, limit))  # without one, the system had no more memory
+    return status == "crashed" and "SIGKILL" in (row.get("message") or "")
 
 
 def summary(rows: Iterable[Row], cases: int, console: Console) -> int:

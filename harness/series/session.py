@@ -115,10 +115,13 @@ class SeriesSession(Reporter):
 
     solver : made by the caller, or else by its name. report : called with phase="solve" and `cases` where
     the solver begins, so that each case can have its time limit, and with phase="judging" where it ends; a
-    case is then judged as soon as it is solved, unless several are solved at once.
+    case is then judged as soon as it is solved, unless several are solved at once. batched : whether a solver
+    that can solve several at once does.
     """
 
-    def __init__(self, job: Job, solver: Solver | None = None, report: Report | None = None) -> None:
+    def __init__(
+        self, job: Job, solver: Solver | None = None, report: Report | None = None, batched: bool = True
+    ) -> None:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
         self.report: Report = report or (lambda **event: None)
@@ -133,7 +136,7 @@ class SeriesSession(Reporter):
         solver = solver or make_solver(job.solver, job.solver_options, job.plugin)
         self.row: Row = {}  # of the case being solved
         self.session = SolverSession(solver, self.problem, job.tolerance, self, KEPT_ANSWERS)
-        self.session.open(batched=True)
+        self.session.open(batched)
 
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
@@ -183,7 +186,7 @@ class SeriesSession(Reporter):
         return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
 
     def _try(self, case: int, load: LoadCase) -> Attempt:
-        """Solve one; if the solver raises, its status is `failed`."""
+        """Solve one; if the solver raises, its status is `failed`, or `memory_limit` if memory runs out."""
         self.report(phase="solve", cases=[case])
         self.row = self._new_row(case)
         near = self.session.nearest(load)
@@ -194,6 +197,8 @@ class SeriesSession(Reporter):
         except Exception as error:
             self.session.forget()
             answer = failed(f"{type(error).__name__}: {error}"[:500])
+            if isinstance(error, MemoryError):
+                self.row["status"] = "memory_limit"
         return Attempt(case, load, self.row, answer)
 
     def results(self, attempts: list[Attempt], assessed: dict[int, Assessment]) -> list[Result]:
@@ -219,7 +224,7 @@ class SeriesSession(Reporter):
     def _result(self, attempt: Attempt, assessment: Assessment | None) -> Result:
         answer, job = attempt.answer, self.job
         row = attempt.row | {
-            "status": answer.status,
+            "status": attempt.row.get("status", answer.status),
             "message": answer.cause,
             "iterations": answer.iterations,
             "inner_iterations": answer.inner_iterations,

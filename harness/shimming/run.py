@@ -140,7 +140,7 @@ def shim(
     """
     source, directory, read = str(scene), Path(out), read_scene(str(scene))
     inputs = [Path(file) for file in (scene, patches, *cases.files) if file]
-    refuse_inputs([directory / name for name in OUTPUTS], inputs)
+    refuse_inputs([directory / name for name in OUTPUTS], [*read.sources, *inputs])
     asked: dict[str, Any] = {
         "limit_mm": allow_gap_mm,
         "allow_force": allow_force,

@@ -1,5 +1,6 @@
 """Writes every report: Markdown from sections, with a PNG per figure and a CSV per table beside it."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -10,6 +11,10 @@ import pandas as pd
 from report.document.blocks import Figure, Section, Table
 from report.document.escape import csv_frame, markdown, picture, short
 from report.figures import style
+
+#: A picture or table beside a page, as the page names it; a bracket of a quoted text has a backslash.
+LINK = re.compile(r"(?<!\\)\]\(([^()/\\]+\.(?:png|csv))\)")
+BESIDE = ("index.html", "sheet.pdf")
 
 
 def written(
@@ -46,9 +51,10 @@ def written(
     return path
 
 
-def emptied(directory: Path) -> Path:
-    """The directory, made if need be, without the pictures and tables of an older report."""
+def emptied(directory: Path, page: str = "report.md") -> Path:
+    """The directory, made if need be, without the files of an older report: its page names them."""
     directory.mkdir(parents=True, exist_ok=True)
-    for stale in [*directory.glob("*.png"), *directory.glob("*.csv")]:
-        stale.unlink()
+    if (older := directory / page).is_file():
+        for name in (*LINK.findall(older.read_text("utf-8", "replace")), *BESIDE):
+            (directory / name).unlink(missing_ok=True)
     return directory

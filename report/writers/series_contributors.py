@@ -2,7 +2,8 @@
 
 import pandas as pd
 
-from report.document.blocks import Block, Figure, Table, number, word
+from report.document.blocks import Block, Figure, Table, Text, number, word
+from report.document.numbers import out_of
 from report.figures import contributors
 from report.results.series_results import Series
 
@@ -17,9 +18,12 @@ SLOPES = (
 
 
 def contributors_of(series: Series) -> list[Block]:
-    """The blocks of a series for contributors; none unless all of its cases are answered."""
-    if series.facts.get("cases_per_point", 1) == 1 or len(series.cases) < series.facts["cases"]:
+    """The blocks of a series for contributors, or why there are none: they need the answers to all cases."""
+    if series.facts.get("cases_per_point", 1) == 1:
         return []
+    if missing := series.facts["cases"] - len(series.cases):
+        without = out_of(missing, series.facts["cases"], "case")
+        return [Text(f"**Contributors** and derivatives are left out: {without} without an answer.")]
     gaps = series.cases["max_gap_mm"].to_numpy(), series.cases["gap_error_mm"].max()
     table = contributors.indices(series, *gaps)
     blocks: list[Block] = [Figure("contributors", OF_GAP, contributors.bars(table), table)]

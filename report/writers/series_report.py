@@ -70,7 +70,8 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
     facts, check = series.facts, series.facts.get("allowed_gap") or {"kind": "", "said": []}
     *sure, verdict = check["said"] or [f"The largest gap left is {_largest(series)}."]
     sure = [exactness(float(series.cases["gap_error_mm"].max())), *sure, MESH]
-    pictures = [directory / "allowed-gap.png", target / "worst-case.png", target / "quantile-maps.png"]
+    allowed = [directory / "allowed-gap.png"] if check["said"] else []
+    pictures = [*allowed, target / "worst-case.png", target / "quantile-maps.png"]
     record = facts | {
         "commit": series.code["commit"].iloc[-1],
         "scene_key": facts["identity"].get("scene_key"),

@@ -28,7 +28,7 @@ def write(directory: Path) -> Path:
     found = study(directory)
     with style.applied():
         made = [section(found) for section in SECTIONS]
-    target = emptied(directory / "study") / "study.md"
+    target = emptied(directory / "study", "study.md") / "study.md"
     return written(target, TITLE, [section for section in made if section])
 
 

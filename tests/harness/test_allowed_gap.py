@@ -175,10 +175,34 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     assert (again.exit_code, "PASS: in none of 12 cases" in again.stdout) == (0, True)
     assert harness(*command, "--out", tmp_path).exit_code == 0
     assert "PASS" not in (tmp_path / "report" / "report.md").read_text()
+    assert not [*tmp_path.glob("allowed-gap.*")]
     unknown = harness(*command, "--allow-gap", 1e-16, "--out", tmp_path)
     assert (unknown.exit_code, "In 12 of 12 cases it cannot be told" in unknown.stdout) == (3, True)
     unjudged = harness(*command, "--limit", 1e-30, "--allow-gap", allowed, "--out", tmp_path / "unjudged")
     assert (unjudged.exit_code, f"{CASES} cannot be judged" in unjudged.stdout) == (4, True)
+
+
+def test_a_case_without_an_answer_is_in_the_verdict(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    """It cannot pass; what the others show is said all the same."""
+    command = ("series", gap[0], "--cases", CASES, "--check", 0, "--threads", 1, "--out", tmp_path)
+    assert harness(*command).exit_code == 0
+    row = list(series_file.rows(tmp_path))[3]
+    lost = {"case": 3, "gap_seed": row["gap_seed"], "status": "failed", "verdict": "no_answer", "message": ""}
+    series_file.append(tmp_path, [(lost, None)])
+    done = harness(*command, "--allow-gap", 9.0)
+    assert done.exit_code == 1
+    assert f"Surely within 9 mm: {CASES - 1} of {CASES} cases" in done.stdout
+    low = binomtest(CASES - 1, CASES).proportion_ci(0.95, "wilson").low
+    assert f"between {low:.2%} and 100.00%" in done.stdout
+    assert (
+        f"In 1 of {CASES} cases it cannot be told whether a gap is larger than 9 mm: there is no"
+        in done.stdout
+    )
+    assert "PASS" not in done.stdout
+    assert (tmp_path / "allowed-gap.csv").is_file()
+    done = harness(*command, "--allow-gap", 1e-3)
+    assert done.exit_code == 4
+    assert f"FAIL: the gap is larger than 0.001 mm in {CASES - 1} of {CASES} cases" in done.stdout
 
 
 def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:

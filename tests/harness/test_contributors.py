@@ -22,7 +22,7 @@ from problems.load_cases.sweep import keys_of
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
-from report.document.blocks import Figure
+from report.document.blocks import Figure, Text
 from report.figures.contributors import indices, of_contacts
 from report.results.series_results import Series, read
 from report.writers.series_contributors import contributors_of
@@ -140,7 +140,9 @@ def test_what_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert moving.sum() > few.sum() > 0
     assert (np.isnan(shares) == few).all()
     assert contributors_of(done)
-    assert not contributors_of(replace(done, cases=done.cases[1:]))
+    (left_out,) = contributors_of(replace(done, cases=done.cases[1:]))
+    assert isinstance(left_out, Text)
+    assert "left out: 1 of 64 cases without an answer" in left_out.markdown
 
 
 def test_forces_in_fasteners(tmp_path: Path) -> None:

@@ -6,7 +6,9 @@ import re
 import shutil
 import sqlite3
 from contextlib import closing
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ import pytest
 from commands import harness
 from strip_scene import write_strip
 from suite_runs import changed
+from synthetic_series import IDENTITY
 from typer.testing import Result
 
 from harness.measurement.suite_run import record_machine
@@ -154,6 +157,31 @@ def test_a_series_whose_damage_sqlite_cannot_spell_is_named(tmp_path: Path) -> N
         connection.execute("DELETE FROM sqlite_master WHERE name = 'facts'")
     with pytest.raises(InputError, match=rf"{SERIES}: content"):
         series_file.read_facts(tmp_path)
+
+
+def test_a_reader_is_waited_for_and_then_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that another program reads is not damaged: nobody is told to delete it."""
+    facts = {"identity": IDENTITY, "scene": "a", "title": "a", "machine": "a", "cases": 1, "threads": 1}
+    series_file.write_fact(tmp_path, "series", json.dumps(facts))
+    row = {"case": 0, "verdict": "no_answer"}
+    with closing(sqlite3.connect(tmp_path / SERIES)) as reader:
+        reader.execute("BEGIN")
+        assert reader.execute("SELECT count(*) FROM cases").fetchone() == (0,)
+        seconds = count()
+
+        def clock() -> int:
+            if (now := next(seconds)) == 3:
+                reader.rollback()
+            return now
+
+        monkeypatch.setattr(series_file, "RETRY_S", 0)
+        monkeypatch.setattr(series_file, "time", SimpleNamespace(monotonic=clock))
+        with monkeypatch.context() as patch:
+            patch.setattr(series_file, "WAIT_S", 0)
+            with pytest.raises(OSError, match=rf"{SERIES}: another program keeps it open"):
+                series_file.append(tmp_path, [(row, None)])
+        series_file.append(tmp_path, [(row, None)])
+    assert list(series_file.rows(tmp_path)) == [row]
 
 
 def test_fewer_cases_are_reported_as_that_many(series: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,10 @@ from pathlib import Path
 
 import pytest
 from commands import harness
+from strip_scene import write_strip
+
+from harness.results.records import PLANS
+from harness.results.schema import SERIES
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
 COMMANDS = [
@@ -45,6 +49,50 @@ def test_an_answer_replaces_no_file_that_its_scene_names(tmp_path: Path) -> None
     assert done.exit_code == 2
     assert "is one of the files that are read" in done.stderr
     assert matrices.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        ("series strip.toml --cases 1", "report/scan.csv"),
+        ("series strip.toml --cases 1", "allowed-gap.csv"),
+        ("place strip.toml --count 1 --cases 2 --share 1", "report/scan.csv"),
+        ("tolerance strip.toml --key initial_gap.mean --range 0.1:0.2 --allow-gap 1", "shares.csv"),
+        ("run gate --solver gi --scene gallery/three-part-stack", "report/scan.csv"),
+        ("run gate --solver gi --scene gallery/three-part-stack", "suite.toml"),
+    ],
+)
+def test_a_file_that_no_command_wrote_is_left_alone(
+    command: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Said before the work: nothing is written into the folder."""
+    monkeypatch.chdir(tmp_path)
+    write_strip(tmp_path)
+    file = tmp_path / name
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("mine")
+    before = sorted(tmp_path.rglob("*"))
+    done = harness(*command.split(), "--out", ".")
+    assert done.exit_code == 2
+    assert f"has {Path(name).parts[0]} of another command: name another directory" in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+    assert file.read_text() == "mine"
+
+
+@pytest.mark.parametrize("command", ["series strip.toml --cases 1", "place strip.toml --count 1 --cases 2"])
+def test_a_scan_among_the_files_of_a_report_is_left_alone(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the command has a report already, as its journal says."""
+    monkeypatch.chdir(tmp_path)
+    write_strip(tmp_path)
+    Path("report").mkdir()
+    Path("report/worst-case.csv").write_text("x,y,gap\n")
+    for journal in (SERIES, PLANS):
+        Path(journal).touch()
+    done = harness(*command.split(), "--around", "report/worst-case.csv", "--out", ".")
+    assert done.exit_code == 2
+    assert "report/worst-case.csv': is one of the files that are read" in done.stderr
 
 
 @pytest.mark.parametrize("command", COMMANDS)

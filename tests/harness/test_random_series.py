@@ -20,6 +20,7 @@ from harness.series.session import Job, SeriesSession
 from harness.shimming.patches import patches_of
 from harness.shimming.study import ShimStudy
 from problems.errors import InputError
+from problems.load_cases.random_inputs import RandomInputs
 from problems.load_cases.stream import drawn_cases
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
@@ -78,6 +79,17 @@ def test_the_cases_do_not_depend_on_their_order_or_worker(scene: Path) -> None:
         (("--random", "fasteners.preload=normal(60, 20)"), "must be greater than 0"),
         (("--random", "ribs.I=uniform(60, 20)"), "N of DISTRIBUTION: it changes K"),
         (("--random", "pressure.value=norm()", "--sweep", "initial_gap.mean=1,2"), "random gaps, --gaps or"),
+        (
+            (
+                "--random",
+                "initial_gap.random.sd=uniform(0.1, 0.1)",
+                "--sd",
+                "0.2",
+                "--correlation-length",
+                "90",
+            ),
+            "--sd: mm = 0.2: left out: initial_gap.random.sd is random",
+        ),
     ],
 )
 def test_bad_random_keys_are_refused(
@@ -87,6 +99,23 @@ def test_bad_random_keys_are_refused(
     assert done.exit_code == 2
     assert said in " ".join(done.output.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_number_of_the_field_is_random_or_an_option(tmp_path: Path) -> None:
+    """In a search, too, and by the table of a scene; the others may be options."""
+    path = tmp_path / "scene.toml"
+    path.write_text(STRIP + '\n[random]\ninitial_gap.mean = "normal(0.6, 0.05)"\n')
+    scene = read_scene(str(path))
+    with pytest.raises(InputError) as refused:
+        GapCases(mean=0.3, sd=0.05, random=("initial_gap.random.sd=uniform(0.1, 0.1)",)).of_search(
+            scene, "dual"
+        )
+    assert [fault.where for fault in refused.value.faults] == ["--mean", "--sd"]
+    cases = GapCases(sd=0.05).of(scene, "dual")
+    assert isinstance(cases, RandomInputs)
+    assert cases.gaps is not None
+    assert cases.gaps.field.random is not None
+    assert cases.gaps.field.random.sd == 0.05
 
 
 @pytest.mark.usefixtures("without_pictures")

@@ -21,12 +21,15 @@ from suite_runs import series_rows, wait_for
 from harness.results import records, series_file
 from harness.results.schema import SERIES
 from harness.series import session as session_module
+from harness.series.load_case_source import GapCases
 from harness.series.run import summary
 from harness.series.session import Job, Result, SeriesSession
+from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.problem import Dual
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
+from rivetbench import run_series
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
@@ -95,12 +98,63 @@ def test_again_solves_nothing_and_more_cases_extend() -> None:
     np.testing.assert_allclose(gaps_of("grown"), gaps_of("at-once"), atol=1e-9)
 
 
+def test_fewer_cases_are_the_first_of_them() -> None:
+    def rows(count: int) -> list[dict[str, Any]]:
+        return run_series("strip.toml", "fewer", GapCases(count=count), report=False).rows
+
+    longer = rows(5)
+    assert rows(2) == longer[:2]
+    assert rows(5) == longer
+
+
 @pytest.mark.parametrize("change", [("--sd", "0.3"), ("--limit", "1e-6")])
 def test_another_series_is_refused(change: tuple[str, str]) -> None:
     series("--cases", "3", "--out", "mine")
     ended = series("--cases", "3", "--out", "mine", *change, code=2)
     assert "name another directory" in ended.output
     assert len(rows_of("mine")) == 3
+
+
+KILLED = "killed by SIGKILL, perhaps by the system because memory ran out"
+
+
+@pytest.mark.parametrize(
+    ("end", "again"),
+    [
+        ({"status": "time_limit", "time_limit_s": 9.0}, False),
+        ({"status": "time_limit", "time_limit_s": 8.0}, True),
+        ({"status": "memory_limit", "memory_limit_mib": 900}, False),
+        ({"status": "memory_limit", "memory_limit_mib": 800}, True),
+        ({"status": "memory_limit"}, True),
+        ({"status": "crashed", "message": "killed by SIGSEGV"}, False),
+        ({"status": "crashed", "message": KILLED}, True),
+        ({"status": "failed", "message": "ValueError: no step"}, False),
+    ],
+)
+def test_a_case_is_tried_again_if_its_cause_may_have_passed(
+    end: dict[str, Any], again: bool, tmp_path: Path
+) -> None:
+    command = "--cases", "3", "--time-limit", "9", "--memory-limit", "900", "--out", str(tmp_path)
+    series(*command)
+    row = rows_of(str(tmp_path))[1]
+    lost = {"case": 1, "gap_seed": row["gap_seed"], "verdict": "no_answer", "message": "", **end}
+    series_file.append(tmp_path, [(lost, None)])
+    assert f"3 cases, {3 - again} already" in series(*command, code=0 if again else 1).output
+    assert rows_of(str(tmp_path))[1]["verdict"] == ("within" if again else "no_answer")
+
+
+def test_memory_that_ran_out_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve, command = SolverSession.next, ("--cases", "3", "--solver", "gi", "--out", "memory")
+
+    def short(self: SolverSession, load: Any, near: Any, case: int | None = None) -> Any:
+        if case == 1:
+            raise MemoryError("as numpy does")
+        return solve(self, load, near, case)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SolverSession, "next", short)
+        assert "case 1: memory_limit, no_answer: MemoryError" in series(*command, code=1).output
+    assert "3 cases, 2 already" in series(*command).output
 
 
 def test_a_full_disk_leaves_whole_cases() -> None:
@@ -269,6 +323,24 @@ def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault:
     assert [row["case"] for row in rows] == list(range(count))
     assert {row["status"] for row in rows} == {"solved"}
     assert [("setup_s" in row) for row in rows] == [False] * session_module.BLOCK + [True] * 5
+
+
+def test_the_case_that_ends_a_process_is_told_from_those_solved_at_once() -> None:
+    """A plug-in that ends where no contact closes, alone or among others."""
+    text = tiny_joint.EXACT.replace("L = sla", "load.p.max() > 0 or __import__('os')._exit(7); L = sla")
+    text += """
+    def batched(self, state):
+        return lambda loads, tolerance: [self.solve(state, load, tolerance) for load in loads]
+"""
+    Path("ends.py").write_text(text)
+    swept = ("--sweep", "initial_gap.mean=0.1,0.2,90.0,0.3,0.4", "--check", "0", "--out", "ends")
+    plugin = ("--plugin", "ends.py", "--solver", "ends")
+    assert "Not solved: 2" in series(*swept, *plugin, code=1).output
+    *within, ended = rows_of("ends")
+    assert [row["verdict"] for row in within] == ["within"] * 2
+    assert (ended["case"], ended["status"], ended["time_limit_s"]) == (2, "crashed", 60.0)
+    assert "5 cases, 3 already" in series(*swept, *plugin, code=1).output
+    assert [row["verdict"] for row in rows_of("ends")] == ["within"] * 2 + ["no_answer"] + ["within"] * 2
 
 
 @pytest.mark.parametrize(

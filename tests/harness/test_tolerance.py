@@ -4,13 +4,14 @@ import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
+from io import StringIO
 from math import inf
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from commands import harness
+from commands import harness, onto
 from scipy.stats import binom, binomtest, norm
 from strip_scene import write_strip
 
@@ -185,3 +186,29 @@ def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPat
     ends = [share_interval(kept, count) for kept in table["kept"]]
     np.testing.assert_allclose(table[["low", "high"]], ends, rtol=1e-12)
     assert "](shares.png)" in (tmp_path / "out/report.md").read_text()
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_cases_without_an_answer_are_counted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """In each line, in the outcome and in the table; they keep no limit."""
+
+    def rows(folder: Path) -> list[dict[str, float]]:
+        value = float(folder.name.removesuffix("-fresh"))
+        return [
+            {"case": 0},
+            *({"case": k, "max_gap_mm": k * value, "gap_error_mm": 0.0} for k in range(1, 10)),
+        ]
+
+    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
+    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": 10})
+    monkeypatch.setattr(series_file, "rows", rows)
+    said = StringIO()
+    asked = f"{SD}=0.1:0.5", 1.0, 0.5, 0.5
+    found = tolerance(write_strip(tmp_path), tmp_path / "out", *asked, reporter=onto(said))
+    assert f"{SD} = 0.1: within 1 mm in 9 of 10 cases, 1 without an answer." in said.getvalue()
+    assert found.value == 0.1
+    assert (
+        found.sentences[1]
+        == "Without an answer, and counted as too large a gap: 4 of 40 cases over all values."
+    )
+    assert pd.read_csv(tmp_path / "out/shares.csv")["no_answer"].tolist() == [1] * 4

@@ -1,5 +1,6 @@
 """Statistics of a series against brute force, and the report's files."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from synthetic_series import CASES, M, made
 from harness.results import series_file
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
 from report.writers.series_report import _swept, write
+from report.writers.sheet import Sheet
 
 
 @pytest.mark.parametrize("at_once", [1, 1000, 2**22])
@@ -83,6 +85,34 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         cases = series.cases.assign(**own)
         figure = _swept(replace(series, cases=cases), "initial_gap.mean")
         assert ("initial_gap.mean changes neither" in figure.caption) is said
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_a_report_replaces_the_files_of_the_last_and_no_other(tmp_path: Path) -> None:
+    """Even if the title of the series looks like a link to one."""
+    made(tmp_path, name="[CSV](mine.csv)")
+    target = write(tmp_path).parent
+    older = {path.name for path in target.iterdir()}
+    assert {"quantile-maps.png", "worst-case.csv", "sheet.pdf"} < older
+    (target / "mine.csv").write_text("x,y,gap\n")
+    series_file.write_contacts(tmp_path, {"m": np.array(M)})
+    series_file.append(tmp_path, [({"case": k, "verdict": "no_answer"}, None) for k in range(CASES)])
+    write(tmp_path)
+    assert {path.name for path in target.iterdir()} == {"mine.csv", "report.md", "summary.csv"}
+
+
+def test_the_sheet_has_no_map_of_an_earlier_verdict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made(tmp_path)
+    (tmp_path / "allowed-gap.png").touch()
+    sheets: list[Sheet] = []
+    monkeypatch.setattr("report.writers.series_report.write_sheet", lambda _, sheet: sheets.append(sheet))
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda _, file, **__: file.touch())
+    check = {"kind": "", "said": ["In 1 case it cannot be told."], "allowed_mm": 0.1}
+    for more in ({}, {"allowed_gap": check}):
+        facts = series_file.read_facts(tmp_path) or {}
+        series_file.write_fact(tmp_path, "series", json.dumps(facts | more))
+        write(tmp_path)
+    assert [sheet.pictures[0].name for sheet in sheets] == ["worst-case.png", "allowed-gap.png"]
 
 
 @pytest.mark.usefixtures("without_pictures")
