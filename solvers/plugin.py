@@ -6,12 +6,12 @@ import inspect
 import sys
 import sysconfig
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from importlib.machinery import all_suffixes
 from pathlib import Path
 from types import ModuleType
 
-from problems.errors import InputError
+from problems.errors import Fault, InputError
 
 from .base import Solver
 
@@ -127,3 +127,10 @@ def solver_class(module: ModuleType, path: Path) -> type[Solver]:
     if complete:
         allowed = "must be one subclass of Solver, not several"
     raise InputError.one(path, "Solver", names, allowed)
+
+
+def unused(plugin: str | Path | None, names: Collection[str]) -> list[Fault]:
+    """The fault of a plug-in whose solver is not one of these."""
+    if plugin is None or (name := Path(plugin).stem) in names:
+        return []
+    return [Fault("--solver", "name", ", ".join(dict.fromkeys(names)), f"{name}, that of --plugin {plugin}")]

@@ -90,10 +90,14 @@ def check(
     """
     with error_reporting(interrupted="Interrupted.") as console:
         from harness.conformance.isolated import run as run_checks
+        from problems.errors import InputError
+        from solvers.plugin import unused
         from solvers.registry import modules
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         names = solver or ([plugin.stem] if plugin else list(modules()))
+        if faults := unused(plugin, names):
+            raise InputError(faults)
         raise typer.Exit(run_checks(names, plugin, time_limit, memory_limit, console))
 
 

@@ -64,7 +64,8 @@ def run(
     """Measure a suite and write rows, answers and report.
 
     Each measurement is a process of its own, stopped at its time or memory limit. Rows are saved as they are
-    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped.
+    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped. Until then, the
+    directory takes no run that leaves out some of its measurements.
 
     --with measures versions of a library side by side. pip installs each once, into an environment in the
     cache that has all other packages from here. A version that cannot be installed, or that its adapter
@@ -151,6 +152,8 @@ def gate(
     --max-slowdown compares a solver's times with those of the other solvers on the scene in the same run, and
     this ratio with the baseline's, which may be of another machine. It takes three repeats of both.
 
+    Of a search for a tolerance, the one that it keeps is judged; runs that a trace stopped are not.
+
     In a job of GitHub's, the outcome is appended to the page of the job ($GITHUB_STEP_SUMMARY).
 
     \b
@@ -165,7 +168,7 @@ def gate(
       1  accuracy lost: a gated row is outside, cannot be judged, has no answer, was never measured, or is
          worse or slower than the baseline
       2  wrong usage or bad input
-      3  nothing could be judged
+      3  nothing could be judged, or with --max-slowdown a time could not be compared
       5  the baseline has none of these measurements, other problems or other limits
     """
     with error_reporting(*NOTHING_WRITTEN) as console:

@@ -28,6 +28,7 @@ from problems.load_cases.sweep import sweep as swept
 from problems.model.scene import Scene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
+from solvers.plugin import unused
 
 STANDARD = SeriesOptions()
 OUTPUTS = ("report", *series_file.CHECK_FILES)
@@ -123,8 +124,7 @@ def run_series(
     faults = cases.faults(sweep)
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
-    if options.plugin and solver != (name := Path(options.plugin).stem):
-        faults.append(Fault("--solver", "name", solver, f"{name}, that of --plugin {options.plugin}"))
+    faults += unused(options.plugin, [solver])
     (made,) = described([(solver, {})], options.plugin, "--solver", reporter)
     if options.form and options.form not in made.forms:
         faults.append(Fault("--form", "form", options.form, f"{solver} takes {' and '.join(made.forms)}"))

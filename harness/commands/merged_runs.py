@@ -8,7 +8,7 @@ from pathlib import Path
 from harness.measurement.suite_run import record_machine
 from harness.planning.suite import read_written
 from harness.results import records
-from harness.results.comparison import Incomparable, read_side, refuse_incomparable
+from harness.results.comparison import Incomparable, read_rows, refuse_incomparable
 from harness.results.row_validation import refuse_unreadable
 from harness.verification.reference_problem import PROBLEMS
 from problems.errors import InputError, read_all
@@ -21,9 +21,10 @@ def merge(names: Sequence[str], out: Path) -> Path:
 
     Answers stay where they are. Raises InputError; Incomparable if a machine made a measurement in two runs.
     """
-    sides = read_all(read_side, names)
+    sides = read_all(read_rows, names)
     for side in sides[1:]:
         refuse_incomparable(sides[0], side)
+    older = [row for name in names for row in records.read(Path(name) / records.OUTDATED)]
     for folder in map(Path, names):  # before anything is written
         refuse_unreadable(folder)
         if (folder / SUITE).is_file():
@@ -42,5 +43,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
             records.append(out / PROBLEMS, *(row | of_machine for row in records.read(folder / PROBLEMS)))
             for file in (*folder.glob("scenes/*.npz"), *folder.glob(SUITE)):
                 shutil.copy(file, out / file.relative_to(folder))
+        if older:
+            records.append(out / records.OUTDATED, *older)
         records.append(out / records.MEASUREMENTS, *rows)
     return report(out)

@@ -79,7 +79,8 @@ def run(
     Raises
     ------
     InputError
-        If the suite is wrong, or `out` holds something else.
+        If the suite is wrong; if `out` holds something else, has rows to come of another suite, or the row
+        of `key`.
 
     Examples
     --------

@@ -154,13 +154,20 @@ def code_of(solver: Solver) -> str:
 NEEDED = ("key", "scene", "status", "time_limit_s", "memory_limit_mib")
 
 
-def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
-    """The valid rows of DIRECTORY; outdated ones are moved to a file of their own."""
+def rows_in(directory: Path, console: Console) -> list[Row]:
+    """The rows of DIRECTORY, whose torn last line is removed. Raises InputError."""
     path = directory / records.MEASUREMENTS
     if records.remove_torn_line(path):
         console.print(f"{path}: the last line was cut off, and is measured again.", style="yellow")
     rows = records.read(path)
     refuse_wrong_kinds(path, rows, needed=NEEDED)
+    return rows
+
+
+def resumed(
+    directory: Path, rows: list[Row], plan: list[Measurement], solvers: Solvers, console: Console
+) -> list[Row]:
+    """The valid ones of the rows of DIRECTORY; outdated ones are moved to a file of their own."""
     planned = {m.key: m for m in plan}
     sources = {m.scene: m.source for m in plan}
     scene_keys = {name: read_scene(source).key for name, source in sources.items()}
@@ -169,15 +176,17 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
         m = planned.get(row["key"])
         return m is not None and outdated(row, m, solvers[m.solver, m.entry.label], scene_keys[m.scene])
 
-    old = [row for row in rows if is_old(row)]
+    valid: list[Row] = []
+    old: list[Row] = []
+    for row in rows:
+        (old if is_old(row) else valid).append(row)
     if old:
         records.append(directory / records.OUTDATED, *(row | {"answer": None, "log": None} for row in old))
-        rows = [row for row in rows if row not in old]
-        records.rewrite(path, rows)
+        records.rewrite(directory / records.MEASUREMENTS, valid)
         aside = f"Set aside in {records.OUTDATED}, to be measured again: {counted(len(old), 'row')}"
         why = "because the scene, the solver or the limits have changed since"
         console.print(f"{aside}, {why}.", style="yellow")
-    return rows
+    return valid
 
 
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:

@@ -13,8 +13,8 @@ from typing import Any
 from rich.console import Console
 
 from harness.planning.plan import ROUND, Measurement, expand, of_key, round_beside, with_key
-from harness.planning.suite import Suite, to_toml
-from harness.planning.tolerance_search import still_needed
+from harness.planning.suite import Suite
+from harness.planning.tolerance_search import still_needed, unmeasured
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
@@ -32,8 +32,9 @@ from problems.forms.problem import in_form
 from problems.scene_files import read_scene
 from report.document.numbers import counted
 
+from .recorded_suite import other_suite, record_suite
 from .scheduler import done_as_completed, workers
-from .solver_descriptions import Description, Solvers, describe, resumed
+from .solver_descriptions import Description, Solvers, describe, resumed, rows_in
 from .task import Task, TaskResult, rows_of, run_task, run_task_on_worker
 
 
@@ -52,15 +53,15 @@ def run(
     descriptions = describe(suite, ConsoleReporter(console))
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
-    plan = expand(suite) if key is None else of_key(expand(suite), key)
-    text, written = to_toml(suite), directory / "suite.toml"
-    other = (
-        written.is_file() and written.read_bytes() != text.encode()
-    )  # this command, interrupted, left the same
-    folders, outputs = ("answers", "scenes", "logs"), ("report", *["suite.toml"] * other)
+    plan = expand(suite)
+    if key is not None:
+        plan = of_key(plan, key)
+        suite = suite.model_copy(update={"solver": [plan[0].entry]})
+    folders, outputs = ("answers", "scenes", "logs"), ("report", *other_suite(directory, suite))
     with records.locked(directory, folders=folders, outputs=outputs):
-        rows = resumed(directory, plan, solvers, console)
-        records.replace_text(written, text)
+        rows = rows_in(directory, console)
+        record_suite(directory, suite, plan, rows, key)
+        rows = resumed(directory, rows, plan, solvers, console)
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)
@@ -80,12 +81,6 @@ def run(
         of = counted(len(missing), "measurement")
         console.print(f"{of} could not be made; the same command tries again.", style="red")
     return FAILED if missing else code
-
-
-def unmeasured(plan: list[Measurement], rows: list[Row]) -> list[Measurement]:
-    """The measurements of a plan that need a row and have none."""
-    done = {row["key"] for row in rows}
-    return [m for m in plan if m.key not in done and still_needed(m, rows) is not None]
 
 
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:

@@ -11,6 +11,7 @@ from problems.errors import Fault, InputError
 from problems.input.bounded_types import resolved, unknown
 from problems.scene_files import read_scene
 from solvers.base import Form
+from solvers.plugin import unused
 from solvers.registry import modules
 
 from .suite import Suite, resolved_scenes, suite_from
@@ -73,7 +74,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     --scene replaces the suite's scenes, and each entry is measured on those that the suite does not have,
     whatever its own scenes; --size keeps those of that size; --solver keeps those entries and
     adds a default one for a solver that is not in the suite; --with does so for its library, and takes each
-    entry once in each version; --plugin adds its solver.
+    entry once in each version; --plugin adds its solver, which --solver names if it names any.
     """
     faults: list[Fault] = []
     data = suite.model_dump(exclude_none=True)
@@ -94,6 +95,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     named = {entry["name"] for entry in data["solver"]}
     plugins = [change.plugin.stem] if change.plugin and not solvers else []
     data["solver"] += [{"name": name} for name in (*solvers, *plugins) if name not in named]
+    faults += unused(change.plugin, [entry["name"] for entry in data["solver"]])
     data["solver"] = [entry | at for entry in data["solver"] for at in versions.get(entry["name"], [{}])]
     changes = {
         "tolerances": change.tolerances if change.tolerances == "auto" else list(change.tolerances),

@@ -101,7 +101,7 @@ class Measurement:
         """Whether a row is of this solver, form, options and threads, whatever its scene and tolerance."""
         settings = (self.solver, self.form, self.variant, self.entry.options, self.threads)
         names = ("solver", "form", "variant", "options", "threads_asked")
-        return tuple(row[name] for name in names) == settings
+        return tuple(map(row.get, names)) == settings
 
     @property
     def stem(self) -> str:
@@ -217,19 +217,21 @@ def with_key(suite: Suite, key: str) -> Suite:
 
 
 def of_key(plan: Sequence[Measurement], key: str) -> list[Measurement]:
-    """The measurement with this key. Raises InputError.
+    """The measurement with this key, of an entry that plans no other tolerance. Raises InputError.
 
     A load case of a series comes after the earlier ones of its process, because its start depends on them.
     """
     chosen = next((m for m in plan if m.key == key), None)
     if chosen is None:
         raise _unknown(plan[0].suite.name, key)
+    only = {"forms": [chosen.form], "tolerances": [chosen.tolerance], "threads": [chosen.threads]}
+    entry = chosen.entry.model_copy(update=only | {"repeats": chosen.repeat + 1})
     if chosen.case is None:
-        return [chosen]
+        return [replace(chosen, entry=entry)]
     batched = chosen.entry.batched
     end = (chosen.case // (batched or 1) + 1) * (batched or 1)
     same = (m for m in plan if (m.process, m.entry.batched) == (chosen.process, batched))
-    return [m for m in same if m.case is not None and m.case < end]
+    return [replace(m, entry=entry) for m in same if m.case is not None and m.case < end]
 
 
 def _unknown(suite: str, key: str) -> InputError:

@@ -24,15 +24,23 @@ DECADE = 2  # places in HALF_DECADES
 LITTLE = sqrt(10)  # times the limit: an error that half a decade may mend
 
 
+def unmeasured(plan: Sequence[Measurement], rows: Sequence[Row]) -> list[Measurement]:
+    """The measurements of a plan that need a row and have none."""
+    done = {row["key"] for row in rows}
+    return [m for m in plan if m.key not in done and still_needed(m, rows) is not None]
+
+
 def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
     """The measurement in m's place in the plan, at the next tolerance of a search; None if there is none."""
+    if m.guide is None and m.iteration_limit is None and not (m.searched or m.paced):
+        return m
     if not in_a_good_form(m, rows):
         return None
     if m.iteration_limit is not None:
         same = [
             row for row in _of_cell(replace(m, iteration_limit=None), rows) if row["tolerance"] == m.tolerance
         ]
-        return None if any((row["iterations"] or 0) <= m.iteration_limit for row in same) else m
+        return None if any((row.get("iterations") or 0) <= m.iteration_limit for row in same) else m
     first = [row for row in _of_cell(m, rows) if row["repeat"] == 0]
     if m.searched:
         tolerance = next_tolerance(m, rows)
@@ -51,7 +59,8 @@ def in_a_good_form(m: Measurement, rows: Sequence[Row]) -> bool:
     scene, times, most_s = m.guide or ("", inf, inf)
     seconds: dict[str, float] = {}
     for row in rows:
-        if row["scene"] == scene and row["owner"] == "library" and m.same_settings(row | {"form": m.form}):
+        there = row["scene"] == scene and row.get("owner") == "library"
+        if there and m.same_settings(row | {"form": m.form}):
             own = _seconds(row) if row["verdict"] == "within" else inf
             seconds[row["form"]] = min(own, seconds.get(row["form"], inf))
     best = min(seconds.values(), default=inf)
@@ -83,7 +92,8 @@ def next_tolerance(m: Measurement, rows: Sequence[Row]) -> float | None:
     if within and min(within) % DECADE:
         return None
     k = min(within) - DECADE if within else max(missed) + DECADE if missed else min(tried) - DECADE
-    if within and k in tried and (tried[k]["displacement_error_mm"] or inf) <= LITTLE * tried[k]["limit_mm"]:
+    looser = tried.get(k, {}) if within else {}
+    if looser and (looser.get("displacement_error_mm") or inf) <= LITTLE * looser["limit_mm"]:
         k += 1
     return HALF_DECADES[k] if k in range(len(HALF_DECADES)) and k not in tried else None
 

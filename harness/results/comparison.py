@@ -48,23 +48,38 @@ class Side:
         return {str(row.get("machine")) for row in self.rows}
 
 
-def read_side(name: str, key: str | None = None) -> Side:
-    """The rows of a directory; with a key, only the row of that key. Raises InputError."""
+def read_rows(name: str) -> Side:
+    """All rows of a directory. Raises InputError."""
     path = Path(name) / MEASUREMENTS
     if not path.is_file():
         raise InputError.one("DIR", "directory", name, f"has no {path.name}; `run` creates one")
-    rows = [row for row in read(path) if not row.get("round")]
+    rows = read(path)
     refuse_wrong_kinds(path, rows, needed=NEEDED)
     if not rows:
         raise InputError.one("DIR", "directory", name, f"{path.name} has no row yet")
-    if key is not None and not (rows := [row for row in rows if row.get("key") == key]):
+    return Side(name, rows)
+
+
+def read_side(name: str, key: str | None = None) -> Side:
+    """The rows of a directory to compare: none of a round, and none that a trace stopped.
+
+    With a key, only the row of that key, at the tolerance that the key names. Raises InputError.
+    """
+    rows = read_rows(name).rows
+    if key is None:
+        return Side(name, [r for r in rows if not r.get("round") and r.get("iteration_limit") is None])
+    if not (rows := [row | {"searched": False} for row in rows if row.get("key") == key]):
         raise InputError.one("--key", "key", key, f"the key of a row in {name}")
     return Side(name, rows)
 
 
 def measurement(row: Row) -> str:
-    """The measurement of a row, without its repeat: '4386/0107 ipm dual tol=1e-09 threads=2'."""
-    words = [row["scene"], row["solver"], row["form"], row.get("variant"), f"tol={row['tolerance']:g}"]
+    """The measurement of a row, without its repeat: '4386/0107 ipm dual tol=1e-09 threads=2'.
+
+    A tolerance that a search has found is no part of it: 'tol=auto'.
+    """
+    tolerance = "auto" if row.get("searched") else f"{row['tolerance']:g}"
+    words = [row["scene"], row["solver"], row["form"], row.get("variant"), f"tol={tolerance}"]
     asked = {"threads": row.get("threads_asked"), "batched": row.get("batched"), "case": row.get("case")}
     words += [f"{word}={value}" for word, value in asked.items() if value is not None]
     return " ".join(filter(None, words))

@@ -12,17 +12,18 @@ baseline are read from its rows; its answers need not have been kept.
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.results.comparison import Side, floor_mm, measurement, read_side, refuse_incomparable
 from harness.results.records import Row, replace_text, to_line
+from harness.results.searches import counting
 from harness.terminal.console import legible
 
 from .judge import Judgement
-from .slowdown import slowdowns
+from .slowdown import NEEDED, Times, slowdowns
 
 SUITE = "rivetbench gate"
 JUDGED = ("verdict", "displacement_error_mm", "reference_bound_mm")  # of a finding, in JSON
@@ -32,7 +33,7 @@ MARGIN = 10.0  # by which an error may exceed the baseline's
 @dataclass(frozen=True)
 class Finding:
     """One gated measurement, judged again. why : the reason if it failed. baseline_mm : its error there.
-    slowdown : S of slowdown.py if that is why.
+    slowdown : S of slowdown.py if that is why. untimed : whether its time was to be compared and cannot be.
     """
 
     key: str
@@ -41,6 +42,7 @@ class Finding:
     why: str = ""
     baseline_mm: float | None = None
     slowdown: float | None = None
+    untimed: bool = False
 
     @property
     def passed(self) -> bool:
@@ -48,23 +50,23 @@ class Finding:
 
     @property
     def judged(self) -> bool:
-        return self.judgement.verdict in ("within", "outside")
+        return self.judgement.verdict in ("within", "outside") and not self.untimed
 
 
 @dataclass(frozen=True)
 class Baseline:
     """The largest error of each measurement within its limit, mm, and the error bound of its reference.
 
-    name : of its directory. margin : the allowed factor. slower : see `slowdowns`.
+    name : of its directory. margin : the allowed factor. times : see `slowdowns`; None if they do not count.
     """
 
     name: str
     margin: float
     errors: Mapping[str, tuple[float, float]]
-    slower: Mapping[str, float] = field(default_factory=dict)
+    times: Times | None = None
 
     def compared(self, row: Row, finding: Finding) -> Finding:
-        """The finding of a row with its error in the baseline, failed if it is beyond the margin, or slower.
+        """The finding of a row beside the baseline: failed if its error is beyond the margin, or by its time.
 
         Unchanged if the baseline has no error of this measurement within the limit.
         """
@@ -76,10 +78,17 @@ class Baseline:
         if judged.verdict != "within" or error_mm is None:
             return finding
         if error_mm <= self.margin * max(then_mm, floor_mm(max(bound_mm, then_bound_mm), finding.limit_mm)):
-            slowdown = self.slower.get(measurement(row))
-            why = f"{slowdown:.2f} times the baseline's time, beside other solvers" if slowdown else ""
-            return replace(finding, why=why, slowdown=slowdown)
+            return self._timed(finding, measurement(row))
         return replace(finding, why=f"more than {self.margin:g} times the baseline's {then_mm:.1e} mm")
+
+    def _timed(self, finding: Finding, name: str) -> Finding:
+        if self.times is None:
+            return finding
+        if name not in self.times.compared:
+            return replace(finding, why=f"its time cannot be compared: that takes {NEEDED}", untimed=True)
+        slowdown = self.times.slower.get(name)
+        why = f"{slowdown:.2f} times the baseline's time, beside other solvers" if slowdown else ""
+        return replace(finding, why=why, slowdown=slowdown)
 
 
 def read_baseline(
@@ -90,14 +99,14 @@ def read_baseline(
     """
     side = read_side(str(directory))
     refuse_incomparable(side, Side(name, list(rows)))
-    slower = slowdowns(side, read_side(name), max_slowdown) if max_slowdown else {}
+    times = slowdowns(side, read_side(name), max_slowdown) if max_slowdown else None
     errors: dict[str, tuple[float, float]] = {}
-    for row in side.rows:
+    for row in counting(side.rows):
         error, bound = row.get("displacement_error_mm"), row.get("reference_bound_mm") or 0.0
         if row["verdict"] == "within" and error is not None and isfinite(error + bound):
             key = measurement(row)
             errors[key] = max(errors.get(key, (0.0, 0.0))[0], error), bound
-    return Baseline(str(directory), margin, errors, slower)
+    return Baseline(str(directory), margin, errors, times)
 
 
 def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: int) -> None:
@@ -123,7 +132,7 @@ def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: i
 
 
 def write_junit(path: Path, findings: Sequence[Finding]) -> None:
-    """A test case per finding: a failure if accuracy was lost, an error if nothing could be said."""
+    """A test case per finding: a failure if it became worse, an error if that could not be told."""
     kinds = ["" if one.passed else "failure" if one.judged else "error" for one in findings]
     count = Counter(kinds)
     counts = {"tests": str(len(findings)), "failures": str(count["failure"]), "errors": str(count["error"])}

@@ -1,7 +1,7 @@
 """The accuracy gate: judges the saved answers again; its exit code says whether all are accurate enough.
 
-The figures in the rows are not used. A row only says which answer belongs to which scene; the problem's
-data and the reference are made from the scene.
+The figures in the rows are not used. A row only says which answer belongs to which scene, and which
+tolerance a search keeps; the problem's data and the reference are made from the scene.
 """
 
 from collections.abc import Iterator
@@ -14,13 +14,13 @@ from pydantic import Field, create_model
 from rich.console import Console
 from rich.table import Table
 
-from harness.planning.plan import expand
-from harness.planning.suite import RandomCases, read_written
+from harness.planning.suite import RandomCases
 from harness.results import records
 from harness.results.answer_files import is_kept
 from harness.results.atomic_output import refuse_outputs
 from harness.results.records import Row
 from harness.results.row_validation import MEASUREMENT, refuse_wrong_kinds
+from harness.results.searches import counting
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from problems.errors import InputError
@@ -31,10 +31,14 @@ from report.document.numbers import counted, out_of
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
+from .missing_rows import never_measured
 from .reference_problem import ReferenceProblem, measurable
 
-#: What the gate reads of a row: which answer belongs to which scene.
-NEEDED = ("key", "source", "scene_key", "form", "status", "gated", "limit_mm")
+#: What the gate reads of a row: which answer belongs to which scene, and how a search went.
+NEEDED = (
+    *("key", "source", "scene_key", "form", "status", "gated", "limit_mm"),
+    *("scene", "solver", "tolerance", "repeat", "verdict"),
+)
 GATED = create_model(
     "Gated",
     __base__=MEASUREMENT,
@@ -58,7 +62,7 @@ class GateOutcome:
     findings : list of Finding
         One per gated row: its key, its judgement, its limit_mm, and why it has not passed.
     code : int
-        Exit code of the command: 0 passed, 1 accuracy lost, 3 nothing could be judged.
+        Exit code of the command: 0 passed, 1 accuracy lost, 3 nothing could be judged or a time not compared.
     sentences : tuple of str
         The outcome in words.
     """
@@ -131,10 +135,11 @@ def gate(
     named = {"--json": json_file, "--junit": junit_file}
     outputs = {option: Path(file) if file else None for option, file in named.items()}
     refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])
-    rows = gated_rows(folder / records.MEASUREMENTS)
+    made = validated_rows(folder / records.MEASUREMENTS)
+    rows = {row["key"]: row for row in counting(made) if row["gated"]}
     refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
     standard = read_baseline(base, margin, str(folder), rows.values(), max_slowdown) if base else None
-    findings = [*judged(rows, folder, reference_limit_s, standard), *never_measured(rows, folder)]
+    findings = [*judged(rows, folder, reference_limit_s, standard), *never_measured(rows, made, folder)]
     code, sentences = concluded(findings, standard)
     if json_file:
         write_json(Path(json_file), folder, findings, code)
@@ -149,7 +154,9 @@ def concluded(findings: list[Finding], baseline: Baseline | None) -> tuple[int, 
     if not {"within", "outside"} & set(verdicts):
         return NOTHING_JUDGED, ("Nothing could be judged: no gated row has an answer that can be.",)
     slower = sum(finding.slowdown is not None for finding in findings)
-    worse = {"Accuracy lost": sum(not finding.passed for finding in findings) - slower, "Slower": slower}
+    untimed = sum(finding.untimed for finding in findings)
+    failed = sum(not finding.passed for finding in findings)
+    worse = {"Accuracy lost": failed - slower - untimed, "Slower": slower}
     if any(worse.values()):
         told = (f"{what}: {out_of(k, len(findings), 'gated row')}." for what, k in worse.items() if k)
         return FAILED, tuple(told)
@@ -157,14 +164,18 @@ def concluded(findings: list[Finding], baseline: Baseline | None) -> tuple[int, 
     if baseline and not compared:
         why = f"no gated row has an error within its limit in {baseline.name}"
         return NOTHING_JUDGED, (f"Nothing could be compared: {why}.",)
+    timed = f"Times compared: {out_of(compared - untimed, compared, 'gated row')}."
+    if untimed:
+        return NOTHING_JUDGED, (timed,)
     wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
     rows = counted(len(findings), "gated row")
     passed = f"Passed: {f'all {rows} are' if len(findings) > 1 else f'{rows} is'} within {limits}."
     if not baseline:
         return DONE, (passed,)
-    times = f"none exceeds its error there {baseline.margin:g} times"
-    return DONE, (passed, f"{compared} of them are in {baseline.name}: {times}.")
+    errors = f"none exceeds its error there {baseline.margin:g} times"
+    sentences = passed, f"{compared} of them are in {baseline.name}: {errors}."
+    return DONE, (*sentences, timed) if baseline.times else sentences
 
 
 def show(outcome: GateOutcome, console: Console) -> int:
@@ -177,11 +188,11 @@ def show(outcome: GateOutcome, console: Console) -> int:
     return outcome.code
 
 
-def gated_rows(path: Path) -> dict[str, Row]:
-    """The gated rows by key. Raises InputError if a field is missing, of another kind or out of bounds."""
+def validated_rows(path: Path) -> list[Row]:
+    """The rows of a run. Raises InputError if a field is missing, of another kind or out of bounds."""
     rows = records.read(path)
     refuse_wrong_kinds(path, rows, GATED, NEEDED)
-    return {row["key"]: row for row in rows if row["gated"]}
+    return rows
 
 
 def judged(
@@ -225,19 +236,6 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
         case _:
             why = ""
     return Finding(row["key"], judgement, limit, why)
-
-
-def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
-    """The gated measurements of the suite that have no row; suite.toml itself if it is missing."""
-    path = directory / "suite.toml"
-    if not path.is_file():
-        why = "is missing, so that nobody knows which rows there should be: run again"
-        yield Finding(path.name, Judgement("cannot_be_judged"), LIMIT_MM, why)
-    else:
-        for measurement in expand(read_written(path)):
-            if measurement.entry.gated and measurement.key not in rows:
-                why = "never measured: the run did not end"
-                yield Finding(measurement.key, Judgement("no_answer"), measurement.suite.limit_mm, why)
 
 
 def table(findings: list[Finding]) -> Table:

@@ -13,6 +13,8 @@ Three repeats on each side are needed: all new ones are slower by chance once in
 scene become slower alike, nothing is reported.
 """
 
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from math import inf
 
 from harness.results.comparison import Side, measurement
@@ -20,9 +22,19 @@ from problems.errors import InputError
 from report.analysis.comparison import ENOUGH, compared
 from report.results.rows import frame
 
+NEEDED = f"{ENOUGH} repeats of two solvers on its scene, in both runs"
 
-def slowdowns(old: Side, new: Side, limit: float) -> dict[str, float]:
-    """S of each measurement that is slower, limit : R. Raises InputError if none can be told."""
+
+@dataclass(frozen=True)
+class Times:
+    """compared : the measurements whose times can be compared. slower : S of those that are slower."""
+
+    compared: Collection[str]
+    slower: Mapping[str, float]
+
+
+def slowdowns(old: Side, new: Side, limit: float) -> Times:
+    """The measurements that are slower, limit : R. Raises InputError if no time can be compared."""
     frames = [frame([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)]
     table = compared(frames[0], frames[1], True, inf, limit)
     table = table[(table[["repeats_old", "repeats_new"]].min(axis=1) >= ENOUGH) & table["ratio"].notna()]
@@ -30,8 +42,7 @@ def slowdowns(old: Side, new: Side, limit: float) -> dict[str, float]:
     pairs = pairs[pairs["solver_new"] != pairs["solver_new_other"]]
     lines = pairs.groupby("measurement")[["ratio", "ratio_least", "ratio_other", "ratio_most_other"]].median()
     if lines.empty:
-        allowed = f"{ENOUGH} repeats of two solvers on one scene, in both runs: --repeat {ENOUGH}"
-        raise InputError.one("--max-slowdown", "factor", limit, allowed)
+        raise InputError.one("--max-slowdown", "factor", limit, f"{NEEDED}: --repeat {ENOUGH}")
     S = lines["ratio"] / lines["ratio_other"]
     slower = S[(limit < S) & (lines["ratio_least"] > lines["ratio_most_other"])]
-    return {str(name): float(each) for name, each in slower.items()}
+    return Times({*map(str, lines.index)}, {str(name): float(each) for name, each in slower.items()})

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from typing import Any
 
 import pandas as pd
 
@@ -11,6 +13,7 @@ from report.document.numbers import counted, listed
 from report.results.reader import Results
 
 DIGITS = 10  # of a commit, in sentences
+ANY = "any form"  # of an entry that names none
 
 
 def warnings(results: Results) -> list[str]:
@@ -91,20 +94,34 @@ def _short(name: str) -> str:
 
 
 def _unfinished(results: Results) -> list[str]:
-    """The suite's scenes count without those that the model rejects, as it should."""
-    problems, suite, line = results.problems, results.suite, ["solver", "variant", "scene", "form"]
+    """The suite's scenes count without those that the model rejects, as it should. With `times_best_form`,
+    libraries do not count, whose slow forms are left out on purpose.
+    """
+    rows, problems, suite = results.rows, results.problems, results.suite
     refused = set(problems.loc[problems["refused"].notna(), "scene"]) if "refused" in problems else set()
+    libraries = set(rows.loc[rows["owner"] == "library", "solver"]) if suite.get("times_best_form") else set()
+    names = dict(zip(rows["source"], rows["scene"], strict=True))
     planned = {
-        (solver.get("name"), solver.get("variant", ""), *solver.get("with", []), scene, form)
+        (solver.get("name"), _label(solver), scene, form)
         for solver in suite.get("solver", [])
-        for scene in suite.get("scenes", [])
-        if scene not in refused and any(fnmatchcase(scene, glob) for glob in solver.get("scenes", ["*"]))
-        for form in solver.get("forms", [None])
+        if solver.get("name") not in libraries
+        for source in suite.get("scenes", [])
+        if (scene := names.get(source, source)) not in refused
+        and any(fnmatchcase(scene, glob) or glob == source for glob in solver.get("scenes", ["*"]))
+        for form in solver.get("forms", [ANY])
     }
-    made = len(results.rows.drop_duplicates(line))
-    if made >= len(planned):
+    whole = rows[rows["iteration_limit"].isna()]
+    lines = list(zip(*(whole[name] for name in ("solver", "variant", "scene", "form")), strict=True))
+    made = planned & {*lines, *((*line[:-1], ANY) for line in lines)}
+    if made == planned:
         return []
     return [
-        f"The run is not finished: {made} of {len(planned)} combinations of scene, solver and form of "
+        f"The run is not finished: {len(made)} of {len(planned)} combinations of scene, solver and form of "
         f"{suite.get('name', 'the suite')} are measured. Run it again with the same directory to continue."
     ]
+
+
+def _label(solver: Mapping[str, Any]) -> str:
+    """The variant and the versions of an entry of the suite, as rows have it."""
+    versions = " ".join(solver.get("with", [])).removeprefix(f"{solver.get('name')}==")
+    return f"{solver.get('variant', '')} {versions}".strip()

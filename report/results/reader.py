@@ -100,11 +100,18 @@ class Results:
         names = self.rows["machine"].unique()
         if len(names) < 2:
             return [self]
-        split = [self.rows[self.rows["machine"] == name].reset_index(drop=True) for name in names]
         of = self.problems["machine"] if "machine" in self.problems else pd.Series(None, self.problems.index)
-        problems = [self.problems[of.isna() | (of == name)] for name in names]
-        pairs = zip(split, problems, strict=True)
-        return [replace(self, rows=rows, cells=cells_of(rows), problems=own) for rows, own in pairs]
+
+        def part(name: str) -> "Results":
+            rows, rounds, outdated = (
+                table[table["machine"] == name].reset_index(drop=True)
+                for table in (self.rows, self.rounds, self.outdated)
+            )
+            problems = self.problems[of.isna() | (of == name)]
+            cells = cells_of(rows)
+            return replace(self, rows=rows, cells=cells, problems=problems, rounds=rounds, outdated=outdated)
+
+        return [part(name) for name in names]
 
 
 def read(directory: Path) -> Results:

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, of_kind
+from harness.results.searches import chosen
 from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
@@ -40,19 +41,8 @@ def frame(records: list[dict[str, Any]], by: Sequence[str] = ()) -> pd.DataFrame
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
     rows = rows.drop_duplicates([*CELL, "repeat", "case", *by], keep="last")
-    return rows[_chosen(rows, by)].reset_index(drop=True)
-
-
-def _chosen(rows: pd.DataFrame, by: Sequence[str]) -> pd.Series[bool]:
-    """The rows to keep: a search keeps its loosest tolerance within the limit, or else the tightest."""
-    searched, first = rows["searched"] == 1.0, rows["repeat"] == 0
-    if not searched.any():
-        return ~searched
     line = [name for name in (*CELL, *by) if name != "tolerance"]
-    within = rows["tolerance"].where(first & (rows["verdict"] == "within"))
-    best = rows.assign(tolerance=within).groupby(line, dropna=False)["tolerance"].transform("max")
-    last = rows.groupby(line, dropna=False)["tolerance"].transform("min")
-    return ~searched | (rows["tolerance"] == best.fillna(last))
+    return rows[chosen(rows, line)].reset_index(drop=True)
 
 
 def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:

@@ -120,6 +120,39 @@ def test_the_cases_of_a_series_are_measurements_of_their_own(tmp_path: Path) -> 
     assert "1 worse, 2 alike" in done.stdout
 
 
+def searched(kept: float, **figures: Any) -> list[dict[str, Any]]:
+    """A search that keeps a tolerance, as the next looser one does not suffice."""
+    missed = {"verdict": "outside", "displacement_error_mm": 1e-3}
+    return [row(tolerance=10 * kept, searched=True, **missed), row(tolerance=kept, searched=True, **figures)]
+
+
+@pytest.mark.parametrize(
+    ("kept", "figures", "said"),
+    [
+        (1e-5, {}, "1 measurement: 1 alike"),
+        (1e-6, {}, "1 measurement: 1 alike"),
+        (1e-7, {"displacement_error_mm": 9e-8}, "2.0 digits lost"),
+        (1e-7, {"verdict": "outside", "displacement_error_mm": 2e-7}, "within → outside"),
+    ],
+)
+def test_the_answer_that_a_search_keeps_is_compared(
+    kept: float, figures: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    """Whatever its tolerance; those that it tried are no measurements."""
+    old = write_rows(tmp_path / "old", searched(1e-6))
+    done = compare(old, write_rows(tmp_path / "new", searched(kept, **figures)))
+    assert said in done.stdout
+    assert done.exit_code == (0 if "alike" in said else 1)
+
+
+def test_runs_that_a_trace_stopped_are_not_compared(tmp_path: Path) -> None:
+    """A method that takes fewer iterations than before has fewer of them."""
+    stopped = [row(variant=f"stopped at {k}", iteration_limit=k) for k in (1, 2, 4)]
+    old, new = (write_rows(tmp_path / name, [row(), *stopped[:k]]) for name, k in (("old", 3), ("new", 2)))
+    done = compare(old, new)
+    assert (done.exit_code, "1 measurement: 1 alike" in done.stdout) == (0, True)
+
+
 def test_times_of_other_machines_are_refused_and_accuracy_is_not(tmp_path: Path) -> None:
     old = write_rows(tmp_path / "old", [row()])
     slow = write_rows(tmp_path / "slow", [row(machine="another", solve_s=100.0)])

@@ -61,6 +61,14 @@ def test_the_largest_error_of_repeats_counts(finished: Path, copy: Path, errors:
     assert found.errors[measurement(first)][0] == 3e-9
 
 
+def test_a_baseline_has_the_error_of_the_tolerance_that_a_search_keeps(finished: Path, copy: Path) -> None:
+    loose, tight = (row | {"searched": True} for row in rows_of(finished))
+    tight |= {"displacement_error_mm": 5e-9}
+    records.rewrite(copy / records.MEASUREMENTS, [tight, loose | {"displacement_error_mm": 3e-9}])
+    found = read_baseline(copy, 10.0, "now", [loose])
+    assert {name: error for name, (error, _) in found.errors.items()} == {measurement(loose): 3e-9}
+
+
 @pytest.mark.parametrize(("bound", "then"), [(1e-9, 1e-13), (1e-13, 1e-9)])
 @pytest.mark.parametrize(("error", "exceeded"), [(0.9e-8, False), (1.1e-8, True)])
 def test_none_below_bounds(finished: Path, bound: float, then: float, error: float, exceeded: bool) -> None:
@@ -182,7 +190,8 @@ def test_times_are_compared_beside_other_solvers(
     first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
     old, new = Side("old", timed(first, *BEFORE)), Side("new", timed(first, times, others))
     found = slowdowns(old, new, 1.5)
-    assert found == ({} if slowdown is None else {measurement(first): pytest.approx(slowdown)})
+    assert found.slower == ({} if slowdown is None else {measurement(first): pytest.approx(slowdown)})
+    assert measurement(first) in found.compared
 
 
 def test_single_runs_tell_nothing_of_times() -> None:
@@ -200,11 +209,25 @@ def test_a_slower_solver_does_not_pass(copy: Path, tmp_path: Path) -> None:
     suite = (copy / "suite.toml").read_text().replace("[1e-06, 1e-08]", "[1e-06]")
     (copy / "suite.toml").write_text(suite.replace("repeats = 1", "repeats = 3"))
     assert gate(copy, "--baseline", old).exit_code == 0
+    assert "Times compared: 3 of 3" in gate(copy, "--baseline", copy, "--max-slowdown", 1.5).stdout
     done = gate(copy, "--baseline", old, "--max-slowdown", 1.5, "--json", tmp_path / "gate.json")
     assert done.exit_code == 1
     assert "Slower: 3 of 3 gated rows." in done.stdout
     assert "2.00 times the baseline's time" in done.stdout
     assert json.loads((tmp_path / "gate.json").read_text())["measurements"][0]["slowdown"] == pytest.approx(2)
+
+
+def test_a_time_that_cannot_be_compared_does_not_pass(copy: Path, tmp_path: Path) -> None:
+    """One of two measurements has a single run on each side."""
+    repeated, single = rows_of(copy)
+    records.rewrite(copy / records.MEASUREMENTS, [*timed(repeated, *BEFORE), single])
+    old = shutil.copytree(copy, tmp_path / "old")
+    assert gate(copy, "--baseline", old).exit_code == 0
+    done = gate(copy, "--baseline", old, "--max-slowdown", 1.5, "--junit", tmp_path / "gate.xml")
+    assert done.exit_code == 3
+    assert "Times compared: 3 of 4 gated rows." in done.stdout
+    (error,) = ElementTree.parse(tmp_path / "gate.xml").getroot().iter("error")
+    assert "cannot be compared" in str(error.get("message"))
 
 
 def test_times_without_repeats_or_another_solver_tell_nothing(copy: Path, finished: Path) -> None:

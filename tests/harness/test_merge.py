@@ -64,6 +64,22 @@ def test_no_ratio_is_of_two_machines(both: tuple[Path, Path], tmp_path: Path) ->
         assert set(dense["K_s"]) == {seconds}
 
 
+def test_rounds_and_older_versions_stay_with_their_machine(tmp_path: Path) -> None:
+    """What was measured beside others of its hour is compared on each machine, as before."""
+    began, sides = "2026-01-01T00:00:00+00:00", []
+    for name, seconds in ((FAST, 2.0), (SLOW, 1446.0)):
+        beside = row(LOW, "textbook", key="beside", owner="textbook", round=began)
+        sides.append(machine(tmp_path / name.split()[1], name, seconds, beside))
+        records.append(sides[-1] / records.OUTDATED, row(LOW, "gi", machine=name, solver_version="0.9"))
+    assert harness("merge", *sides, "--out", tmp_path / "both").exit_code == 0
+    parts = read(tmp_path / "both").by_machine()
+    assert [set(part.rows["machine"]) for part in parts] == [{FAST}, {SLOW}]
+    for part in parts:
+        for table in (part.rounds, part.outdated):
+            assert table["machine"].tolist() == part.rows["machine"].tolist()
+    assert [part.rounds["solve_s"].tolist() for part in parts] == [[2.0], [1446.0]]
+
+
 @pytest.mark.parametrize("name", ["machine.json", "problems.jsonl", "suite.toml"])
 @pytest.mark.parametrize("content", [b"\xff{", b"[1]\n"])
 def test_a_damaged_file_is_named_before_anything_is_written(

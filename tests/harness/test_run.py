@@ -16,13 +16,17 @@ import psutil
 import pytest
 import tiny_joint
 from commands import harness
+from rich.console import Console
 from suite_runs import gated, heed_interrupts, moved, rows_of, said_by, wait_for
 
+from harness.measurement.solver_descriptions import Description, resumed
 from harness.measurement.suite_run import run
 from harness.planning.plan import expand, of_key
-from harness.planning.suite import read_suite
+from harness.planning.suite import read_suite, read_written
 from harness.results import records
 from harness.results.answer_files import pack
+from harness.results.records import Row
+from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 
@@ -117,6 +121,50 @@ def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path)
     assert [row[name] for row, name in zip(aside, names, strict=True)] == ["an older one"] * 3
     assert {row["answer"] for row in aside} == {None}
     assert len(rows_of(copy)) == 4
+
+
+class Uncompared(Row):
+    def __eq__(self, other: object) -> bool:
+        raise AssertionError("compared with another row")
+
+
+def test_all_rows_are_set_aside_in_one_pass(copy: Path) -> None:
+    rows = rows_of(copy)
+    plan = expand(read_written(copy / "suite.toml"))
+    solvers = {("exact", ""): Description(["dual"], "another version", "another code")}
+    assert resumed(copy, [*map(Uncompared, rows)], plan, solvers, Console(quiet=True)) == rows_of(copy) == []
+    assert len(records.read(copy / records.OUTDATED)) == len(rows)
+
+
+@pytest.mark.parametrize("suite_is_read", [True, False])
+def test_a_run_that_leaves_out_missing_rows_is_refused(copy: Path, folder: Path, suite_is_read: bool) -> None:
+    """The gate would no longer miss them. Once they are there, it may go on."""
+    suite, rows = read_suite(str(folder / "small.toml")), rows_of(copy)
+    narrower = suite.model_copy(update={"solver": suite.solver[:1]})
+    records.rewrite(copy / records.MEASUREMENTS, rows[:2] + rows[3:])
+    if not suite_is_read:
+        (copy / "suite.toml").write_text("solver = [3]")
+    contents = {path: path.read_bytes() for path in copy.iterdir() if path.is_file()}
+    with pytest.raises(InputError) as caught:
+        said_by(run, narrower, copy)
+    assert (rows[2]["key"] if suite_is_read else "cannot be known") in str(caught.value)
+    assert "name another directory" in str(caught.value)
+    assert {path: path.read_bytes() for path in contents} == contents
+    if suite_is_read:
+        assert said_by(run, suite, copy)[0] == said_by(run, narrower, copy)[0] == 0
+        assert len(rows_of(copy)) == len(rows)
+
+
+def test_a_row_measured_again_leaves_the_directory_as_it_is(copy: Path) -> None:
+    """A missing row joins the others, and suite.toml stays."""
+    suite, rows = (copy / "suite.toml").read_bytes(), rows_of(copy)
+    done = harness("run", copy, "--key", KEY, "--out", copy)
+    assert (done.exit_code, rows_of(copy)) == (2, rows)
+    assert "name another directory" in done.stderr
+    records.rewrite(copy / records.MEASUREMENTS, [row for row in rows if row["key"] != KEY])
+    assert harness("run", copy, "--key", KEY, "--out", copy).exit_code == 0
+    assert {row["key"] for row in rows_of(copy)} == {row["key"] for row in rows}
+    assert (copy / "suite.toml").read_bytes() == suite
 
 
 def test_gate_believes_the_answers_and_not_the_rows(copy: Path) -> None:

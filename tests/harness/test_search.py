@@ -6,13 +6,17 @@ from typing import Any
 
 import pytest
 import tiny_joint
+from rich.console import Console
 from suite_runs import rows_of, said_by
 
+from harness.commands.run_comparison import compare
 from harness.measurement.suite_run import run
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import HALF_DECADES, Measurement, expand
 from harness.planning.suite import read_suite, suite_from
 from harness.planning.tolerance_search import START, next_tolerance, still_needed
+from harness.results.records import MEASUREMENTS, Row, rewrite
+from harness.verification.gate import gate
 from problems.errors import InputError
 from report.results.reader import read
 
@@ -69,6 +73,34 @@ def test_the_search_ends_at_the_first_tolerance_that_suffices(tmp_path: Path) ->
     rows = measured(suite_from(data, tmp_path / "s.toml"), tmp_path / "out")
     assert [row["tolerance"] for row in rows if row["scene"] == "second"] == [looser, enough]
     assert read(tmp_path / "out").cells["tolerance"].nunique() == 1
+
+
+def test_the_gate_judges_what_a_search_keeps(tmp_path: Path) -> None:
+    """And misses its next tolerance or repeat, none of the tolerances that it need not try."""
+    rows, out = measured(suite_of(tmp_path, repeats=2), tmp_path / "out"), tmp_path / "out"
+    kept = [row["key"] for row in rows if row["tolerance"] == rows[-1]["tolerance"]]
+    whole = gate(out)
+    assert whole.passed
+    assert [finding.key for finding in whole.findings] == kept
+    assert len(kept) == 2 < len(rows)
+    for count in (len(rows) - 1, 1):
+        rewrite(out / MEASUREMENTS, rows[:count])
+        judged, missing = gate(out).findings
+        assert judged.judged
+        assert (missing.key, missing.judgement.verdict) == (rows[count]["key"], "no_answer")
+
+
+def test_a_tolerance_that_a_search_tried_is_measured_again(tmp_path: Path) -> None:
+    suite, again = suite_of(tmp_path), tmp_path / "again"
+    first, *_ = measured(suite, tmp_path / "out")
+    run(suite, again, Console(quiet=True), key=first["key"])
+    (row,) = rows_of(again)
+    same = ("key", "tolerance", "verdict", "displacement_error_mm")
+    assert [row[name] for name in same] == [first[name] for name in same]
+    (compared,) = compare(tmp_path / "out", again, key=first["key"], max_slowdown=1e6)
+    assert not compared.worse
+    (finding,) = gate(again).findings
+    assert finding.judgement.verdict == row["verdict"]
 
 
 def test_it_ends_where_the_solver_gives_up(tmp_path: Path) -> None:
@@ -140,6 +172,19 @@ def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float, repeats: int)
     others = [m for m in plan if m.tolerance == plan[0].tolerance and m.form == plan[0].form]
     assert [m.repeat for m in others if still_needed(m, rows)] == [*range(repeats)]
     assert still_needed(replace(plan[0], repeat=4), [])
+
+
+class Unread(list[Row]):
+    def __iter__(self) -> Any:
+        raise AssertionError("the rows were read")
+
+
+def test_rows_are_read_only_for_what_they_may_leave_out(tmp_path: Path) -> None:
+    """So that a series of many cases resumes in a time that grows with their number, not its square."""
+    (m,) = expand(read_suite(str(tiny_joint.write_suite(tmp_path))))
+    assert still_needed(m, Unread()) == m
+    with pytest.raises(AssertionError):
+        still_needed(expand(suite_of(tmp_path))[0], Unread())
 
 
 def test_tolerances_of_the_command_line() -> None:

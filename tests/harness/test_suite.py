@@ -189,6 +189,10 @@ class TestOverrides:
             "mine"
         ]
 
+    def test_a_plugin_that_no_solver_names_is_refused(self, suite: Suite, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match="'piqp': mine, that of --plugin"):
+            overridden(suite, Overrides(plugin=tmp_path / "mine.py", solvers=("piqp",)))
+
     def test_unknown_names_give_the_known_ones(self, suite: Suite) -> None:
         with pytest.raises(InputError, match="allowed: 4386, 6112"):
             overridden(suite, Overrides(sizes=(4387,)))

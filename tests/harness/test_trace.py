@@ -11,6 +11,7 @@ from harness.measurement.suite_run import run
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
 from harness.planning.tolerance_search import still_needed
+from harness.verification.gate import gate
 from report.document.blocks import Figure
 from report.results.reader import read
 from report.sections import trace
@@ -56,6 +57,9 @@ def test_a_trace_stops_a_solver_earlier_and_earlier(tmp_path: Path) -> None:
     assert figure.data["displacement_error_mm"].tolist() == errors
     assert set(figure.data["label"]) == {"ipm (dual)"}
     assert run_again(suite, tmp_path / "run") == 0
+    judged = gate(tmp_path / "run")
+    assert judged.passed
+    assert [finding.key for finding in judged.findings] == [whole["key"], exact["key"]]
 
 
 def run_again(suite: Any, directory: Path) -> int:

@@ -87,3 +87,38 @@ def test_a_report_of_the_same_code_is_the_same_bytes(tmp_path: Path) -> None:
     directory = write_rows(tmp_path, [row(LOW, "a", commit=OTHER), row(HIGH, "a", commit=OTHER)])
     first = write(directory).read_bytes()
     assert write(directory).read_bytes() == first
+
+
+# What is missing.
+
+
+def unfinished(directory: Path, suite: str, *rows: dict[str, Any]) -> list[str]:
+    directory.mkdir()
+    (directory / "suite.toml").write_text(f'scenes = ["{LOW}", "{HIGH}"]\n{suite}', "utf-8")
+    return [doubt for doubt in said(directory, *rows) if "not finished" in doubt]
+
+
+def test_rows_that_the_suite_does_not_plan_finish_no_run(tmp_path: Path) -> None:
+    """Of other solvers, or of runs that a trace stopped."""
+    suite = '[[solver]]\nname = "a"\nvariant = "v"\nwith = ["a==2.0"]\nforms = ["dual"]\n'
+    there = row(LOW, "a", variant="v 2.0")
+    others = [row(LOW, "b"), row(HIGH, "b"), row(HIGH, "a", variant="v 2.0 stopped at 4", iteration_limit=4)]
+    (doubt,) = unfinished(tmp_path / "other", suite, there, *others)
+    assert "1 of 2 combinations" in doubt
+    assert unfinished(tmp_path / "whole", suite, there, there | {"scene": HIGH}) == []
+
+
+def test_a_file_is_the_scene_that_its_rows_name(tmp_path: Path) -> None:
+    suite = '[[solver]]\nname = "a"\nscenes = ["4386/*"]\n'
+    rows = [row(LOW, "a", source=LOW), row(HIGH, "a", source="/x/high.toml")]
+    assert unfinished(tmp_path / "name", suite, *rows) == []
+    (tmp_path / "name" / "suite.toml").write_text(f'scenes = ["{LOW}", "/x/high.toml"]\n{suite}', "utf-8")
+    assert not any("not finished" in doubt for doubt in warnings(read(tmp_path / "name")))
+
+
+def test_forms_that_are_slow_are_left_out_of_libraries_alone(tmp_path: Path) -> None:
+    suite = '[[solver]]\nname = "{}"\nforms = ["dual", "primal"]\n'
+    rows = [row(LOW, "piqp"), row(LOW, "piqp", "primal"), row(HIGH, "piqp")]
+    assert unfinished(tmp_path / "library", "times_best_form = 3\n" + suite.format("piqp"), *rows) == []
+    ours = [each | {"solver": "gi", "owner": "ours"} for each in rows]
+    assert len(unfinished(tmp_path / "ours", "times_best_form = 3\n" + suite.format("gi"), *ours)) == 1

@@ -82,11 +82,14 @@ def test_numbers_of_the_command_line_are_bounded(words: str, said: str, tmp_path
     assert not (tmp_path / "out").exists()
 
 
-def test_a_plug_in_that_is_not_asked_for_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "command", ["series SCENE --out OUT", "run gate --solver newton --out OUT", "check --solver newton"]
+)
+def test_a_plug_in_that_is_not_asked_for_is_refused(command: str, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("raise SystemExit\n")
-    done = harness(
-        "series", scene_file(tmp_path), "--plugin", tmp_path / "mine.py", "--out", tmp_path / "out"
-    )
+    places = {"SCENE": scene_file(tmp_path), "OUT": tmp_path / "out"}
+    words = (places.get(word, word) for word in command.split())
+    done = harness(*words, "--plugin", tmp_path / "mine.py")
     assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
     assert "--solver: name = 'newton': mine, that of --plugin" in done.output
 
