@@ -89,8 +89,8 @@ def scene_of(table: Mapping[str, Any], name: str = "scene") -> Scene:
 
 
 def _as_toml(value: Any) -> Any:
-    """The value as tomllib would return it: dicts, lists and scalars."""
-    if isinstance(value, Table):
+    """The value as tomllib would return it: dicts, lists and scalars, but effects as they are."""
+    if isinstance(value, Table) and not isinstance(value, Effect):
         return value.model_dump(exclude_unset=True)
     if isinstance(value, Mapping):
         return {key: _as_toml(inner) for key, inner in value.items()}
@@ -219,13 +219,14 @@ def _joint(
 
 
 def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> list[EffectTable]:
-    return [EffectTable(where, k, table) for k, table in enumerate(_tables(where, "effect", data, faults))]
+    tables = enumerate(_tables(where, "effect", data, faults))
+    return [EffectTable.of(where, k, table) for k, table in tables]
 
 
-def _tables(where: Path, key: str, data: dict[str, Any], faults: list[Fault]) -> list[dict[str, Any]]:
+def _tables(where: Path, key: str, data: dict[str, Any], faults: list[Fault]) -> list[Any]:
     """The tables [[key]]; none, which `faults` then says, if it is something else."""
     tables = data.pop(key, [])
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+    if not isinstance(tables, list) or not all(isinstance(table, dict | Effect) for table in tables):
         faults.append(Fault(str(where), key, tables, f"tables [[{key}]]"))
         return []
     return tables

@@ -6,6 +6,7 @@ import numpy as np
 
 from harness.verification.judge import Judgement
 from problems.forms.assembly import Vector
+from problems.model.effect import SpringEffect
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 
@@ -45,10 +46,16 @@ class StageAnswer:
 
     @property
     def forces(self) -> dict[str, float]:
-        """The sum of the forces in fasteners, by the name or kind of the effect, and in "contacts"; N."""
+        """The sum of the forces in fasteners, by the name or kind of the effect, and in "contacts"; N.
+
+        A force counts once at each place, whatever contacts it presses; a spring in each contact.
+        """
         sums: dict[str, float] = {}
         for effect in self.scene.effects:
             name, alone = effect.name or effect.kind, replace(self.scene, effects=(effect,))
-            for fastener in fastener_forces(alone, self.x):
-                sums[name] = sums.get(name, 0.0) + fastener["force_N"]
+            forces = [fastener["force_N"] for fastener in fastener_forces(alone, self.x)]
+            if not isinstance(effect, SpringEffect):
+                forces = forces[: effect.element_count(self.scene.joint)]
+            if forces:
+                sums[name] = sums.get(name, 0.0) + sum(forces)
         return sums | {"contacts": float(np.nansum(self.lam))}

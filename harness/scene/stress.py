@@ -130,11 +130,11 @@ def largest_of(scene: JointScene, x: Vector, energy: float = 0.0, of_points: Seq
 
     x : as in `stresses_of`, ± energy, ‖x − x*‖_K. of_points : see `sensitivities`.
     """
-    parts = stresses_of(scene, x)
-    errors = of_points or [part.sensitivity for part in parts]
-    bounds = zip(parts, errors, strict=True)
-    upper = [(part.von_mises + energy * error)[~part.near_force].max(initial=0.0) for part, error in bounds]
-    return float(max(upper, default=0.0))
+    parts, largest = stresses_of(scene, x), 0.0
+    for part, error in zip(parts, of_points or [part.sensitivity for part in parts], strict=True):
+        upper = part.von_mises + (energy * error if energy else 0.0)  # an error may be infinite
+        largest = max(largest, float(upper[~part.near_force].max(initial=0.0)))
+    return largest
 
 
 def sensitivities(scene: Scene, proof: Proof) -> list[Vector]:

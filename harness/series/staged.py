@@ -17,7 +17,7 @@ from problems.build import load_case, shares_stiffness
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.load_cases import LoadCases
+from problems.load_cases import REPLACED, LoadCases
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.springs import Springs
@@ -26,8 +26,6 @@ from problems.model.stage_answers import Elongations, locked, stage_scenes, thro
 from .session import BLOCK, Job, Result, SeriesSession
 
 S = TypeVar("S")
-
-RANDOM = ("initial_gap", "measured_gap")  # what the cases of a series replace
 
 
 def last_scene(scene: Scene) -> Scene:
@@ -41,7 +39,7 @@ def refuse_staged_gaps(scene: Scene) -> None:
         return
     scenes = list(stage_scenes(scene).values())
     for effect in scene.effects_of(GapEffect):
-        if effect.kind in RANDOM and any(effect not in part.effects for part in scenes):
+        if effect.kind in REPLACED and any(effect not in part.effects for part in scenes):
             raise InputError.one(scene.name, "stage", effect.name, f"no {effect.kind}: a series replaces it")
 
 

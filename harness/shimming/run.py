@@ -159,6 +159,14 @@ def shim(
     if allow_stress is not None:
         refuse_unusable(allow_stress, bare)
     there = patches_of(bare.joint, None if patches is None else str(patches))
+    others = [] if patches is None else list(read.effects_of(Shims))
+    touching = [
+        Fault("--patches", f"{patch.name}, {key}", value, allowed)
+        for patch in there
+        for key, value, allowed in patch.shim.faults(bare.joint, others)
+    ]
+    if touching:
+        raise InputError(touching)
     number = 1 if cases.are_one(read) else cases.count or RANDOM
     form = chosen_form(read, ("dual", "sparse"), None, number * len(there)).form
     made = cases.of_search(read, form)

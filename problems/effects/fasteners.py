@@ -27,7 +27,5 @@ class Fasteners(Positions):
     ]
 
     def force(self, joint: AnyJoint) -> Vector:
-        marks = self.marks(joint)
-        preloads = np.resize(self.preload, len(marks))
-        places = [(marks[preloads == force], float(force)) for force in np.unique(preloads)]
-        return pressing_forces(lambda pair: places, self.pairs(joint), joint)
+        presses = [(self.marks(joint), np.asarray(self.preload))]
+        return pressing_forces(lambda pair: presses, self.pairs(joint), joint)

@@ -13,12 +13,12 @@ from problems.model.junction_terms import at_contacts, sides
 
 
 class PartPosition(PartEffect, GapEffect):
-    """g −= r where the part is the first of a contact, g += r where it is the second, with
+    """g −= n·r where the part is the first of a contact, g += n·r where it is the second; n is its normal,
 
-        r = shift + slope_x (x − x_0) + slope_y (y − y_0), mm,
+        r = (−slope_x z, −slope_y z, shift + slope_x x + slope_y y), mm,
 
-    how far it lies towards positive displacements, with its supports and free of stress; (x_0, y_0) is the
-    centre of the junction.
+    how far the part lies towards positive displacements, with its supports and free of stress. x, y and the
+    height z above the plane of the junction are from its centre. Plates have n = (0, 0, 1).
     """
 
     shift: Annotated[Finite, "mm"] = 0.0
@@ -26,9 +26,9 @@ class PartPosition(PartEffect, GapEffect):
     slope_y: Annotated[Finite, "1"] = 0.0
 
     def gap(self, joint: AnyJoint) -> Vector:
+        slopes = np.array([self.slope_x, self.slope_y])
+
         def opened(pair: Pair) -> Vector:
-            from_centre = joint.places(pair) - joint.bounds.mean(axis=0)
-            r = self.shift + from_centre @ np.array([self.slope_x, self.slope_y])
-            return -dict(sides(pair))[self.part] * r
+            return -dict(sides(pair))[self.part] * joint.rigid_motion(self.part, pair, self.shift, slopes)
 
         return at_contacts(opened, [pair for pair in joint.pairs if self.part in pair], joint)

@@ -6,6 +6,7 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from problems.input.bounded_types import Finite, NotNegative, Positive
+from problems.input.scan_points import CLOSE
 from problems.model.effect import StiffnessEffect
 from problems.model.interface import on_part
 from problems.model.joint import Faults
@@ -23,6 +24,8 @@ class Ribs(StiffnessEffect):
         for k, y in enumerate(self.lines):
             if not plate.covers(0.0, y):
                 yield f"lines[{k}]", y, on_part(plate)
+            for first in [i for i in range(k) if abs(self.lines[i] - y) <= CLOSE][:1]:
+                yield f"lines[{k}]", y, f"a line of its own: lines[{first}] is there, too"
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         return plate.beams(self.lines, self.I, self.J, along_x=True)

@@ -1,6 +1,7 @@
 """Shims: a sheet, even or tapered, fills the gap over a rectangle or a polygon."""
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Annotated
 
 import numpy as np
@@ -24,7 +25,7 @@ class Shims(ContactEffect, GapEffect):
     A contact on the border of an outline belongs to what is left of and below it, as far as there is a
     junction: of outlines that touch one has it. Two thicknesses are those at the ends of the longer range,
     and it is linear between. A shim is rigid. One thicker than the gap holds the parts apart; overlapping
-    shims add up.
+    shims add up. Rectangles that touch would both fill the contacts on their common border and are refused.
     """
 
     thickness: Annotated[
@@ -57,6 +58,20 @@ class Shims(ContactEffect, GapEffect):
         if len(places) and not self.covers(places, joint).any():
             x, y = places[((places - self.ranges.mean(axis=1)) ** 2).sum(axis=1).argmin()]
             yield "x, y", self.ranges.tolist(), f"ranges with a node; the nearest: at {x:g}, {y:g} mm"
+        for other in (other for other in others if isinstance(other, Shims)):
+            for x, y in self._on_borders(other, joint)[:1]:
+                both = f"no common border with other shims: both fill the contact at {x:g}, {y:g} mm"
+                value = list(self.outline) or self.ranges.tolist()
+                yield "outline" if self.outline else "x, y", value, f"{both}; of outlines one does"
+
+    def _on_borders(self, other: "Shims", joint: AnyJoint) -> Matrix:
+        """(k, 2) the contacts that both shims cover although they only touch there."""
+        pairs = [pair for pair in self.pairs(joint) if pair in joint.pairs and pair in other.pairs(joint)]
+        places = places_of(joint, pairs)
+        places = places[self.covers(places, joint) & other.covers(places, joint)]
+        around = [places + 10 * NUDGE * np.array(side) for side in product((-1, 1), repeat=2)]
+        apart = [~(self.covers(at, joint) & other.covers(at, joint)) for at in around]
+        return places[np.all(apart, axis=0)]
 
     def _crossed(self) -> Iterator[bool]:
         """Yield of each edge of the outline whether another one passes through it."""

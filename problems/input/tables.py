@@ -45,6 +45,7 @@ HEADING = re.compile(
     rf"(preload)[\s_/,:-]+(?:in\s+)?({FORCE})|(.*?)\s*[\[({{]\s*(.*?)\s*[\])}}]"
     rf"|(.*?)[\s_/,:-]+(?:in\s+)?({BARE})"
 )
+UNIT = rf"(?:\s*[\[({{].*|[\s_/,:-]+(?:in\s+)?(?:k?n(?:/mm)?|{BARE}))?"
 PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 APART = ".,' \u2019\u00a0\u2009\u202f"  # separators of thousands
 GROUPS = re.compile(rf"[+-]?[1-9]\d{{0,2}}([{APART}])\d{{3}}(?:\1\d{{3}})*(?:(?!\1)([.,])\d+)?", re.ASCII)
@@ -96,11 +97,12 @@ AS_NAMED = TableOptions()
 class Rows:
     """The good rows of a file, with their line numbers, and the faults of the others.
 
-    columns : the names of the columns that are there, in the order of the cells of a row.
+    header : the headings. columns : the names of the columns read, in the order of the cells of a row.
     words : the cell of each row under each heading of WORDS; empty without such a column.
     """
 
     path: Path
+    header: list[str] = field(default_factory=list)
     columns: list[str] = field(default_factory=list)
     rows: list[tuple[float, ...]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
@@ -181,6 +183,7 @@ def read_columns(
         there = [heading(cell)[0] for cell in table.header]
         headings |= {name: name for name in optional if name in there}
         read.columns.extend(headings)
+        read.header.extend(table.header)
         _read(table, headings, options, read)
     except InputError as error:
         read.faults.extend(error.faults)
@@ -289,6 +292,12 @@ def heading(cell: str) -> tuple[str, str]:
         return text, ""
     unit = parts[2] or parts[4] or parts[6] or ""
     return (name if unit in LENGTHS or name in UNITS else text), unit
+
+
+def parameter(cell: str, names: Iterable[str]) -> str:
+    """The one of these names that a heading is, whatever its unit; "" if it is none."""
+    words = {name: name.replace("_", r"[\s_-]*") for name in names}
+    return next((name for name, word in words.items() if re.fullmatch(word + UNIT, _plain(cell))), "")
 
 
 def _plain(cell: str) -> str:

@@ -9,6 +9,9 @@ from problems.forms.assembly import LoadCase
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
+#: The kinds of effects whose gaps the cases of a series replace. Those of shims, positions and tools stay.
+REPLACED = ("initial_gap", "measured_gap")
+
 
 class LoadCases(ABC):
     """Load cases, numbered first … first + count − 1. Case k depends on k alone, not on other cases."""

@@ -14,12 +14,11 @@ from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import damage
 from problems.input.scan_points import neighbours, outliers
 from problems.input.tables import AS_NAMED, TableOptions
-from problems.model.effect import GapEffect
 from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
-from . import LoadCases
+from . import REPLACED, LoadCases
 from .gap_tables import read_gaps
 
 MAX_NOTES = 10  # on unusual gaps; further ones are counted
@@ -28,12 +27,13 @@ TABLE_MIB = 2**15
 
 @dataclass(frozen=True)
 class MeasuredGaps(LoadCases):
-    """Case k is the scene with its gaps replaced by a row of the table.
+    """Case k is the scene with a row of the table in place of the gaps that are measured.
 
-    gaps : (rows, m) mm. numbers : the case number of each row; empty if they are 0, 1, 2, …
+    rest : the forces and the other gaps of the scene. gaps : (rows, m) mm. numbers : the case number of each
+    row; empty if they are 0, 1, 2, …
     """
 
-    forces: LoadCase
+    rest: LoadCase
     gaps: Matrix
     count: int
     numbers: tuple[int, ...] = ()
@@ -55,7 +55,7 @@ class MeasuredGaps(LoadCases):
         return {"gaps": digest(np.ascontiguousarray(self._row(k)).tobytes())}
 
     def load(self, k: int) -> LoadCase:
-        return LoadCase(self.forces.f, np.array(self._row(k)))
+        return LoadCase(self.rest.f, self.rest.g + self._row(k))
 
     def only(self, numbers: Sequence[int]) -> "MeasuredGaps":
         """The table without the rows of other cases."""
@@ -76,13 +76,16 @@ def measured_gaps(
 
     An .npz must hold an array `gaps`, or a single array; an .npy is memory-mapped, the others are read into
     memory. A .csv (or .csv.gz) may have a header and a column that counts its rows: see gap_tables.py. A gap
-    that `options` marks as missing becomes that of the nearest contact of its pair. Raises InputError, which
-    names the first case with a fault.
+    that `options` marks as missing becomes that of the nearest contact of its pair. A row replaces the
+    effects of the kinds REPLACED and adds to other gaps. Raises InputError, which names the first case with
+    a fault.
     """
     effects = scene.effects if isinstance(scene, JointScene) else ()
-    forces = load_case(scene, form, [effect for effect in effects if not isinstance(effect, GapEffect)])
-    m = len(forces.g)
+    rest = load_case(scene, form, [effect for effect in effects if effect.kind not in REPLACED])
+    m = len(rest.g)
     ids = scene.joint.ids if isinstance(scene, JointScene) else None
+    if not isinstance(scene, JointScene):  # the only gap that matrices have
+        rest = LoadCase(rest.f, np.zeros(m))
     labels = [] if ids is None else ids[1].tolist()
     gaps = _read(regular_file(path, "file", TABLE_MIB), m, options, labels)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
@@ -96,7 +99,7 @@ def measured_gaps(
         notes = [f"{path}: {lost} missing gaps are taken from the nearest contact of their case"] * bool(lost)
     _refuse_infinite(path, gaps)
     notes += _unusual(scene, path, gaps[:count])
-    return MeasuredGaps(forces, gaps, len(gaps) if count is None else count, notes=tuple(notes))
+    return MeasuredGaps(rest, gaps, len(gaps) if count is None else count, notes=tuple(notes))
 
 
 def _completed(joint: AnyJoint, gaps: Matrix) -> tuple[Matrix, int]:

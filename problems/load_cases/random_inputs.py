@@ -23,17 +23,18 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import stage_scenes
-from problems.model.stages import Plan
+from problems.model.stages import Acting, Plan, of_effect
 from problems.storage import digest
 
 from . import LoadCases
 from .distributions import distribution, values_at
 from .random_gaps import RandomGaps
-from .sweep import MOST_CASES, Key, allowed_keys, keys_of
+from .sweep import MOST_CASES, Key, allowed_keys, in_order, keys_of
 
 LAW = re.compile(r"(?:(each) |([1-9]\d{0,6}) of )?(.*)", re.DOTALL)
 LOCKED = "left out: the stage that sets it locks the approach that it has reached"
 FEW = "N of DISTRIBUTION: it changes K, and a K is kept for each of N values"
+DIVIDED = "left out: its points act or change one by one, not as a pattern"
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class RandomInputs(LoadCases):
     def with_stiffness(self, values: Iterable[Vector]) -> "RandomInputs":
         """The cases on the scene with the K of these numbers of each of `inputs`, whose loads may differ."""
         effects = list(self.scene.effects)
-        for one, v in zip(self.inputs, values, strict=True):
+        for one, v in in_order(zip(self.inputs, values, strict=True)):
             if one.changes_K:
                 effects[one.effect] = one.changed(effects[one.effect], float(v[0]), self.scene.joint)
         return replace(self, scene=replace(self.scene, effects=tuple(effects)))
@@ -177,7 +178,7 @@ class RandomInputs(LoadCases):
     def changed(self, values: Iterable[Vector]) -> list[Any]:
         """The effects that change f or g, with these numbers of each of `inputs`."""
         pieces, joint = dict(self.pieces), self.part.joint
-        for one, v in zip(self.inputs, values, strict=True):
+        for one, v in in_order(zip(self.inputs, values, strict=True)):
             if one.effect in pieces and not one.changes_K:
                 own = pieces[one.effect]
                 pieces[one.effect] = [(k, one.changed(e, one.number(v, k, e), joint)) for k, e in own]
@@ -208,7 +209,7 @@ def inputs_of(
     """The inputs of laws, and what is wrong with these. scanned : whether random gaps pass through a scan."""
     keys, loads, faults, inputs = keys_of(scene, stiffness), keys_of(scene), list[Fault](), list[Input]()
     steps = Plan(scene.effects, scene.stages, scene.joint).steps
-    fresh = {number for step in steps for number, _ in step.fresh}
+    fresh, sources = {number for step in steps for number, _ in step.fresh}, list[str]()
     if scanned:  # a scan has one correlation length
         keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}
     for law in laws:
@@ -236,7 +237,19 @@ def inputs_of(
                 faults.append(Fault(where, "distribution", text, FEW))
             for value in one.at(np.array([0.0, 1.0])).tolist():
                 faults += key.faults(scene, value, f"{where}={text}")
+            sources.append(where)
+    for one, where in zip(inputs, sources, strict=True):
+        if one.path[0] == "pattern" and not one.changes_K and _divided(one, inputs, scene, steps):
+            faults.append(Fault(where, "key", one.name, DIVIDED))
     return inputs, faults
+
+
+def _divided(one: Input, inputs: Sequence[Input], scene: JointScene, steps: Sequence[Acting]) -> bool:
+    """Whether some of the elements of an input's effect act alone: in a stage, or as they are drawn."""
+    effect = scene.effects[one.effect]
+    counts = {len(of_effect(one.effect, step.elements)) for step in steps}
+    drawn = (other.elements and not other.is_column(effect) for other in inputs if other.effect == one.effect)
+    return bool(counts - {0, effect.element_count(scene.joint)}) or any(drawn)
 
 
 def random_inputs(

@@ -1,10 +1,10 @@
 """Load cases that step through values of a scene's keys: initial_gap.mean=0.1:1.0:10."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from math import prod
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -60,6 +60,9 @@ class Key:
             return list(validation_faults(where, type(effect), error, effect_name(scene, self.effect)))
 
 
+Change = TypeVar("Change", bound=tuple[Key, Any])
+
+
 @dataclass(frozen=True)
 class Sweep(LoadCases):
     """All combinations of the values of each key, those of the last one varying fastest."""
@@ -80,9 +83,14 @@ class Sweep(LoadCases):
 
     def load(self, k: int) -> LoadCase:
         effects = list(self.scene.effects)
-        for key, value in zip(self.steps, self.parameters(k).values(), strict=True):
+        for key, value in in_order(zip(self.steps, self.parameters(k).values(), strict=True)):
             effects[key.effect] = key.changed(effects[key.effect], value, self.scene.joint)
-        return load_case(replace(self.scene, effects=tuple(effects)), self.form)
+        return load_case(self.scene, self.form, effects)
+
+
+def in_order(changes: Iterable[Change]) -> list[Change]:
+    """The changes, a key and its value each, with shifts of points, which end a pattern, after all others."""
+    return sorted(changes, key=lambda change: change[0].path[0] == "points")
 
 
 def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:

@@ -140,23 +140,29 @@ def condensed_onto(kept: Indices, part: PartModel, reporter: Reporter = SILENT, 
 
 
 def condensed_load(
-    effect: PartLoadEffect, part: PartModel, interior: Callable[[], tuple[Indices, SparseBlock]]
+    effect: PartLoadEffect,
+    part: PartModel,
+    interior: Callable[[], tuple[Indices, SparseBlock, sp.csr_array]],
+    kept: bool,
 ) -> Vector:
     """(node_count,) forces in N on the junction nodes: f_j − K_ji K_ii⁻¹ f_i, j the deflections there.
 
     The condensed load moves the junction as the load on the whole part does: f_j gains the work of f_i on
     the motions that the junction imposes, and the rest of f_i moves interior nodes alone.
-    interior : returns i and K_ii; called if the load is not in the cache.
+    interior : returns i, K_ii and K_ji; called if the load is not in the cache. kept : whether the cache
+    keeps it: not one of many load cases.
     """
+
+    def force() -> Vector:
+        f, (i, K_ii, K_ji) = effect.load(part), interior()
+        u = K_ii.solve(f[i])
+        u += K_ii.solve(f[i] - K_ii.multiply(u))
+        return np.asarray(f[part.deflections] - K_ji @ u)
+
+    if not kept:
+        return force()
     code = fingerprint([Path(inspect.getfile(type(effect))), Path(__file__)], within=CODE)
     key = storage.digest(
         "load", part_key(part), effect.model_dump(mode="json", exclude={"part", "name"}), code
     )
-
-    def made() -> storage.Entry:
-        f, j, (i, K_ii) = effect.load(part), part.deflections, interior()
-        u = K_ii.solve(f[i])
-        u += K_ii.solve(f[i] - K_ii.multiply(u))
-        return {"force": f[j] - part.stiffness()[j][:, i] @ u}, {}
-
-    return np.array(storage.load_or_make(key, made)[0]["force"])
+    return np.array(storage.load_or_make(key, lambda: ({"force": force()}, {}))[0]["force"])

@@ -15,6 +15,7 @@ from pydantic import Discriminator, Field, PrivateAttr, Tag
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import NUMBER, NUMBERS, Finite, Name, NotNegative, Range, is_list
+from problems.input.scan_points import CLOSE, crowded
 
 from .interface import AnyJoint
 from .joint import Faults, Pair, Table
@@ -181,6 +182,20 @@ class StiffnessEffect(ElementEffect):
     def pad(self) -> tuple[float, Range, Range] | None:
         """Thickness, x range and y range, mm, of an area whose thickness the effect sets."""
         return None
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
+        if self.part not in joint.names or not self.held_points:
+            return
+        (*_, south, north), clamped = joint.outline(self.part)
+        built_in = [y for edge, y in (("south", south), ("north", north)) if edge in clamped]
+        for k, point in enumerate(self.held_points):
+            if any(abs(point[1] - y) <= CLOSE for y in built_in):
+                allowed = "a point off the clamped edges: these are built in, and no support_shift moves them"
+                yield f"points[{k}]", list(point), allowed
+        for first, twin in crowded(np.array(self.held_points)):
+            allowed = f"separate places: points[{first}] is there, too"
+            yield f"points[{twin}]", list(self.held_points[twin]), allowed
 
     @abstractmethod
     def stiffness(self, plate: Plate) -> sp.csr_array:

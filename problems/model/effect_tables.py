@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from pydantic import ValidationError
 
 from problems.errors import Fault
 from problems.input.bounded_types import unknown, validation_faults
-from problems.input.tables import Rows, TableOptions, read_columns
+from problems.input.tables import Rows, TableOptions, heading, parameter, read_columns
 
 from .effect import Effect, unknown_part
 from .interface import AnyJoint
@@ -36,7 +36,8 @@ class EffectTable:
     """An [[effect]] table at a place in a file, the effect made of it, and the rows of its CSV file.
 
     effect : None if the table is invalid. If the CSV has bad rows, the effect is made of the good ones, so
-    that these and the other parameters are still checked.
+    that these and the other parameters are still checked. of_points : the lines and the stages of the points
+    of an effect that was read before.
     """
 
     where: Path
@@ -44,6 +45,15 @@ class EffectTable:
     content: dict[str, Any]
     effect: Effect | None = None
     rows: Rows | None = None
+    of_points: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
+
+    @classmethod
+    def of(cls, where: Path, index: int, table: dict[str, Any] | Effect) -> Self:
+        """The table, or that of an effect."""
+        if not isinstance(table, Effect):
+            return cls(where, index, table)
+        of_points = table._lines, table._stages
+        return cls(where, index, table.model_dump(exclude_unset=True), of_points=of_points)
 
     def read(self) -> Iterator[Fault]:
         """Make the effect; yield the faults that the table has without regard to the joint."""
@@ -65,6 +75,7 @@ class EffectTable:
             options = TableOptions(tuple(names.get(name, name) for name in wanted), tuple(missing), skip)
             optional = [name for name in effect.more_columns if name not in names]
             self.rows = read_columns(self.where.parent / str(content["file"]), wanted, options, optional)
+            yield from self._unread(effect, options.columns)
             content = {key: value for key, value in content.items() if key not in (*FILE_KEYS, "file")}
             count = len(effect.columns)
             content["points"] = [row[:count] for row in self.rows.rows]
@@ -76,6 +87,12 @@ class EffectTable:
                 content[name] = column[0] if len(set(column)) == 1 else column
         try:
             self.effect = effect.model_validate(content)
+            (lines, stages), count = self.of_points, len(getattr(self.effect, "points", ()))
+            if len(lines) == count:
+                self.effect._lines, self.effect._stages = lines, stages
+            elif stages:
+                allowed = f"{len(stages)} points: the column stage of its file has as many"
+                yield from self._located(iter([("points", f"{count} points", allowed)]))
             if self.rows:
                 self.effect._lines = tuple(f"{self.rows.path.name}, line {line}" for line in self.rows.lines)
                 self.effect._stages = tuple(self.rows.words["stage"])
@@ -99,6 +116,18 @@ class EffectTable:
         if not isinstance(missing, list) or (missing and "gap" not in effect.columns):
             allowed = "of a measured_gap, a list of what marks a point without a gap, as [9999, 'NaN']"
             yield "missing", missing, allowed
+
+    def _unread(self, effect: type[Effect], read: Sequence[str]) -> Iterator[Fault]:
+        """Yield the headings of the file, but those read, that are parameters and no columns."""
+        columns = (*effect.columns, *effect.more_columns)
+        names = [name for name in effect.model_fields if name not in (*Effect.model_fields, *columns)]
+        wanted = [heading(text)[0] for text in read]
+        if self.rows is None:
+            return
+        for cell in self.rows.header:
+            if (name := parameter(cell, names)) and heading(cell)[0] not in wanted:
+                allowed = f"no column {name}: a file has {', '.join(columns)}; {name} is a key of the effect"
+                yield Fault(str(self.rows.path), "header", cell, allowed)
 
     def unknown_stages(self, names: Sequence[str]) -> Iterator[Fault]:
         """Yield the rows of the file that name none of the stages."""

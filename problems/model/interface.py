@@ -80,6 +80,12 @@ class AnyJoint(Protocol):
     def areas(self, part: str) -> Vector:
         """(unknowns of the part,) forces of a pressure of 1 N/mm² along its normals."""
 
+    def rigid_motion(self, part: str, pair: Pair, shift: float, slopes: Vector) -> Vector:
+        """(c,) how far a part that is shifted and tilted moves along the normals of a pair's contacts, mm.
+
+        shift : mm, along the normal of the junction. slopes (2,) : along x and y, about its centre.
+        """
+
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         """x and y of a grid over the junction on which a random field of that length is drawn."""
 

@@ -174,6 +174,9 @@ class Joint(Table):
     def nodes_of(self, part: str) -> Matrix:
         return self.nodes
 
+    def rigid_motion(self, part: str, pair: Pair, shift: float, slopes: Vector) -> Vector:
+        return np.asarray(shift + (self.nodes - self.bounds.mean(axis=0)) @ slopes)
+
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         return self.x, self.y
 

@@ -43,7 +43,7 @@ class JointModel:
     scene: JointScene
     joint: Joint
     parts: tuple[PartModel, ...]
-    interiors: dict[int, tuple[Indices, SparseBlock]] = field(default_factory=dict, repr=False)
+    interiors: dict[int, tuple[Indices, SparseBlock, sp.csr_array]] = field(default_factory=dict, repr=False)
     stored_sparse: ClassVar[None] = None  # no K is given
     dependent: ClassVar[bool] = False  # parts touch those beside them
 
@@ -89,7 +89,8 @@ class JointModel:
             else:
                 from .condensation import condensed_load  # of the dense forms only
 
-                own = condensed_load(load, self.parts[k], partial(self.interior, k))
+                kept = load in self.scene.effects
+                own = condensed_load(load, self.parts[k], partial(self.interior, k), kept)
                 f[joint.unknowns(load.part)] += own
         return LoadCase(f, g)
 
@@ -166,12 +167,12 @@ class JointModel:
             nodes[place[place >= 0]] = np.column_stack([plate.x[ix], plate.y[iy]])[place >= 0]
         return nodes
 
-    def interior(self, k: int) -> tuple[Indices, SparseBlock]:
-        """The unknowns i of a part that condensation eliminates, ordered for a narrow band, and K_ii."""
+    def interior(self, k: int) -> tuple[Indices, SparseBlock, sp.csr_array]:
+        """The unknowns i of a part that condensation eliminates, ordered for a narrow band, K_ii and K_ji."""
         if k not in self.interiors:
-            part = self.parts[k]
+            part, K = self.parts[k], self.parts[k].stiffness()
             i = part.others[np.argsort(self.numbering.places[k][part.others])]
-            self.interiors[k] = i, sparse_block(sp.csc_array(part.stiffness()[i][:, i]))
+            self.interiors[k] = i, sparse_block(sp.csc_array(K[i][:, i])), K[part.deflections][:, i]
         return self.interiors[k]
 
     def part_unknowns(self, k: int, x: Vector) -> Vector:
@@ -188,7 +189,7 @@ class JointModel:
         for load in self.part_loads(k):
             f += load.load(part)
         u[part.deflections] = x[self.joint.unknowns(self.joint.part[k].name)]
-        i, K_ii = self.interior(k)
+        i, K_ii, _ = self.interior(k)
         b = (f - part.stiffness() @ u)[i]
         u[i] = K_ii.solve(b)
         u[i] += K_ii.solve(b - K_ii.multiply(u[i]))

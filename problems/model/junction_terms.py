@@ -36,7 +36,7 @@ def at_contacts(values: Callable[[Pair], Vector | float], pairs: Sequence[Pair],
 
 
 def pressing_forces(
-    acting: Callable[[Pair], Iterable[tuple[Matrix, float]]], pairs: Sequence[Pair], joint: AnyJoint
+    acting: Callable[[Pair], Iterable[tuple[Matrix, Vector | float]]], pairs: Sequence[Pair], joint: AnyJoint
 ) -> Vector:
     """Forces that press the two parts of each pair together, along the normal of the first.
 
@@ -44,7 +44,7 @@ def pressing_forces(
     ----------
     acting : function
         Gives for a pair some (points, force): at each of the points (k, 2), mm, acts this force, N, so that
-        their sum is k · force. A negative force presses the parts apart.
+        their sum is k · force, or one of (k,). A negative force presses the parts apart.
     pairs : sequence
         The pairs (a, b) that are pressed.
     joint : AnyJoint
@@ -60,7 +60,8 @@ def pressing_forces(
         for part, sign in sides(pair):
             nodal = np.zeros(f[joint.unknowns(part)].shape)
             for points, newton in presses:
-                nodal += newton * joint.deflection(part, points, pair[0]).sum(axis=0)
+                W = joint.deflection(part, points, pair[0])
+                nodal += W.T @ newton if np.ndim(newton) else newton * W.sum(axis=0)
             f[joint.unknowns(part)] += sign * nodal
     return f
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import PLAIN, Finite, NotNegative, Truth
-from problems.input.scan_points import crowded
+from problems.input.scan_points import CLOSE, crowded
 
 from .effect import ContactEffect, Effect, ForceEffect, SpringEffect
 from .interface import AnyJoint, on_junction
@@ -79,16 +79,21 @@ class Positions(ContactEffect, ForceEffect):
         return self.pattern.columns * self.pattern.rows if self.pattern else len(self.points)
 
     def only(self, elements: Sequence[int], joint: AnyJoint) -> Self:
-        if len(elements) == self.element_count(joint):
+        count = self.element_count(joint)
+        if len(elements) == count:
             return self
         places = tuple(map(tuple, self.marks(joint)[elements].tolist()))
         update: dict[str, object] = {"points": places, "pattern": None}
         if isinstance(preload := getattr(self, "preload", None), tuple):
             update["preload"] = tuple(preload[k] for k in elements)
         if isinstance(approach := getattr(self, "approach", None), tuple):
-            of_pairs = np.reshape(approach, (-1, self.element_count(joint)))
+            of_pairs = np.reshape(approach, (-1, count))
             update["approach"] = tuple(of_pairs[:, elements].ravel().tolist())
-        return self.model_copy(update=update)
+        some = self.model_copy(update=update)
+        for rows in ("_lines", "_stages"):
+            if len(words := getattr(self, rows)) == count:
+                setattr(some, rows, tuple(words[k] for k in elements))
+        return some
 
     def unusual(self, joint: AnyJoint) -> Faults:
         thinnest = joint.thinnest
@@ -101,9 +106,10 @@ class Positions(ContactEffect, ForceEffect):
         yield from super().faults(joint, others)
         length, width = np.diff(joint.bounds, axis=0)[0].tolist()
         if pattern := self.pattern:
-            spread = [size for size, n in ((length, pattern.columns), (width, pattern.rows)) if n > 1]
-            if 2 * pattern.edge > min(spread, default=np.inf):
-                yield "pattern.edge", pattern.edge, f"at most half the junction, {min(spread) / 2:g} mm"
+            counts = (length, pattern.columns), (width, pattern.rows)
+            spread = [(size, n - 1) for size, n in counts if n > 1]
+            if any(size - 2 * pattern.edge <= CLOSE * n for size, n in spread):
+                yield "pattern.edge", pattern.edge, f"less than half the junction, {min(spread)[0] / 2:g} mm"
                 return
         marks = self.marks(joint)
         if isinstance(preload := getattr(self, "preload", None), tuple) and len(preload) != len(marks):
@@ -111,7 +117,7 @@ class Positions(ContactEffect, ForceEffect):
             return
         for k in np.flatnonzero(~joint.covers(self.parts(joint), marks)):
             yield f"points[{k}]" if self.points else "pattern", marks[k].tolist(), on_junction(joint)
-        for first, twin in crowded(marks) if self.in_holes and self.points else ():
+        for first, twin in crowded(marks) if self.points and (self.in_holes or self._lines) else ():
             allowed = f"separate places: {self.point_name(first)} is there, too"
             yield f"points[{twin}]", marks[twin].tolist(), allowed
         # A hole holds one element: no two fasteners, and nothing else where one is installed.

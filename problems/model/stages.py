@@ -181,7 +181,9 @@ class Plan:
 
     def _clashes(self) -> Faults:
         """Yield the faults of effects that act together. A fastener may be set where a force presses."""
-        told = [fault for effect in self.effects for fault in effect.faults(self.joint)]
+        if any(any(effect.faults(self.joint)) for effect in self.effects):
+            return  # what is wrong with one effect is told first
+        told: list[tuple[str, object, str]] = []
         for step in self.steps:
             acting = acting_effects(self.effects, step.elements, self.joint)
             for number, effect in acting.items():

@@ -182,9 +182,14 @@ class SuperelementJoint:
                 yield f"{name}, median distance along the normal", apart, usual
 
     @cached_property
-    def bounds(self) -> Matrix:
-        every = np.concatenate([face.xyz[:, :2] for face in self.faces.values()])
+    def _box(self) -> Matrix:
+        """(2, 3) the lower and the upper corner of all contact nodes, in the axes of the plane, mm."""
+        every = np.concatenate([face.xyz for face in self.faces.values()])
         return np.array([every.min(axis=0), every.max(axis=0)])
+
+    @property
+    def bounds(self) -> Matrix:
+        return self._box[:, :2]
 
     @property
     def shortest(self) -> float:
@@ -245,6 +250,13 @@ class SuperelementJoint:
         D = sp.csr_array(sp.block_diag([self._own_normals(name) for name in self.names]))
         alike = D.shape[0] == D.shape[1] and abs(D - sp.eye_array(D.shape[0])).max() == 0
         return None if alike else D
+
+    def rigid_motion(self, part: str, pair: Pair, shift: float, slopes: Vector) -> Vector:
+        pairing, face = self.pairings[pair], self.faces[pair[0]]
+        at = face.xyz[pairing.nodes] if part == pair[0] else pairing.W @ self.faces[part].xyz
+        xy, z = np.split(at - self._box.mean(axis=0), [2], axis=1)
+        moved = np.column_stack([-z * slopes, shift + xy @ slopes])
+        return np.asarray((face.normals[pairing.nodes] * moved).sum(axis=1))
 
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         def lines(start: float, stop: float) -> Vector:

@@ -369,6 +369,18 @@ def test_wrong_questions_are_refused(strip: Path, tmp_path: Path, words: Any, sa
     assert not (tmp_path / "out").exists()
 
 
+def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path: Path) -> None:
+    """The contacts on the border of both would be filled twice."""
+    shimmed = tmp_path / "shimmed.toml"
+    rectangle = '[[effect]]\nkind = "shims"\nthickness = 0.02\nx = [50.0, 100.0]\ny = [0.0, 50.0]\n'
+    shimmed.write_text(strip.read_text() + rectangle)
+    done = shim(shimmed, tmp_path / "out")
+    assert done.exit_code == 2
+    assert "--patches: 1, outline" in done.output
+    assert "both fill the contact at 50, 0 mm" in " ".join(done.output.split())
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(("command", "row"), [("shim", 2), ("place", 0)])
 def test_no_answer_of_a_table_that_has_changed_is_used(
     strip: Path, tmp_path: Path, command: str, row: int

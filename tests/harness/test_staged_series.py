@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import harness
 from small_joints import STAGED, with_gap
@@ -10,7 +11,8 @@ from small_joints import STAGED, with_gap
 from harness.results import series_file
 from harness.scene.solution import solve
 from harness.series.load_case_source import GapCases
-from harness.series.staged import last_scene
+from harness.series.session import Job
+from harness.series.staged import StagedSession, last_scene
 from problems.forms import Form
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
@@ -41,6 +43,21 @@ def test_each_case_goes_through_all_stages(scene: Path, tmp_path: Path, form: Fo
         largest = {stage.name: pytest.approx(stage.gap.max(), abs=1e-8) for stage in exact.stages}
         assert row["stages_max_gap_mm"] == largest
     assert len({row["max_gap_mm"] for row in rows}) == COUNT
+
+
+def test_a_shim_of_a_later_stage_leaves_the_measured_gap_of_the_first(scene: Path, tmp_path: Path) -> None:
+    """Each stage of a row of a table is that of the scene with a scan of its gaps."""
+    read = read_scene(str(scene))
+    assert isinstance(read, JointScene)
+    row = np.random.default_rng(2).uniform(0.02, 0.08, read.joint.size[1])
+    np.save(tmp_path / "gaps.npy", row[None])
+    cases = GapCases(gaps=tmp_path / "gaps.npy").of(read, "dual")
+    job = Job(scene=read, cases=cases, form="dual", check=0, threads=1)
+    ((result,),) = StagedSession(job).solve([0])
+    exact = solve(with_gap(read, row))
+    largest = {stage.name: pytest.approx(stage.gap.max(), abs=1e-8) for stage in exact.stages}
+    assert result.row["stages_max_gap_mm"] == largest
+    np.testing.assert_allclose(result.gap, exact.gap, rtol=0, atol=1e-6)
 
 
 def without_shims(scene: JointScene) -> JointScene:

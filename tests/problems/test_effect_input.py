@@ -47,6 +47,9 @@ ALONE = [
     ('kind = "clamps"\nclamping_force = -1\npoints = [[1, 1]]', "clamping_force", "in N"),
     ('kind = "clamps"\nclamping_force = 1\npoints = [[1, 51]]', "points[0]", "0 … 50 mm"),
     ('kind = "installed_fasteners"\nstiffness = 0\npoints = [[1, 1]]', "stiffness", "in N/mm"),
+    ('kind = "supports"\npart = "a"\npoints = [[9, 9], [8, 8], [9, 9]]', "points[2]", "points[0] is there"),
+    ('kind = "supports"\npart = "a"\npoints = [[0, 0], [9, 90]]', "points[1]", "off the clamped edges"),
+    ('kind = "ribs"\npart = "a"\nlines = [20, 30, 20]\nI = 1', "lines[2]", "lines[0] is there"),
     ('kind = "installed_fasteners"\npoints = [[1, 1]]\nbetween = ["a", "c"]', "between", "['a', 'b']"),
     ('kind = "initial_gap"\nmean = 1\nbetween = ["b", "a"]', "between", "['a', 'b']"),
     ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 9, 1], [18, 18, 1]]', "points", "off a line"),
@@ -97,6 +100,7 @@ def test_a_wrong_value_is_named_with_unit_and_range(
 
 MEASURED = "points = [[0, 0, 1], [9, 0, 1], [9, 9, 2]]"
 PAD = 'kind = "local_thickness"\npart = "a"\nthickness = {}\nx = [{}, {}]\ny = [0, 50]'
+SHIMS = 'kind = "shims"\nthickness = 0.2\nx = [{}, {}]\ny = [{}, {}]'
 CONTRADICTIONS = {
     "one gap measured twice": [
         f'kind = "measured_gap"\n{MEASURED}',
@@ -106,6 +110,7 @@ CONTRADICTIONS = {
         'kind = "rigid_tool"\npart = "b"',
         'kind = "rigid_tool"\npart = "b"\ndistance = 1',
     ],
+    "shims that touch": [SHIMS.format(0, 50, 0, 50), SHIMS.format(50, 100, 0, 50)],
     "pads that overlap": [PAD.format(3, 0, 50), PAD.format(4, 49, 80)],
     "a hole twice": [
         'kind = "installed_fasteners"\npoints = [[0, 0]]',
@@ -251,3 +256,9 @@ def test_the_key_depends_on_what_a_file_says_not_on_its_name(tmp_path: Path) -> 
     same = "x,y,gap\n0,0,0.1\n100,0,0.2\n0,50,0.3\n"
     assert key("one.csv", same) == key("two.csv", "gap,y,x,who\n0.1,0,0,A\n0.2,0,100,B\n0.3,50.0,0,C\n")
     assert key("one.csv", same.replace("0.3", "0.31")) != key("two.csv", same)
+
+
+def test_a_clamp_of_a_file_is_listed_once(tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text("x,y\n9,9\n9,9.005\n")
+    (fault,) = faults(tmp_path, 'kind = "clamps"\nclamping_force = 1\nfile = "c.csv"')
+    assert (fault.key, "separate places: " in fault.allowed) == ("line 3", True)

@@ -1,5 +1,7 @@
 """Each effect's one term: gaps, forces at the junction, files of positions."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,10 +17,11 @@ from problems.effects.part_position import PartPosition
 from problems.effects.pressure import Pressure
 from problems.effects.rigid_tool import RigidTool
 from problems.effects.shims import Shims
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Matrix, Vector
 from problems.model.effect import ForceEffect, PartEffect, StiffnessEffect
 from problems.model.fastener_forces import fastener_forces
 from problems.model.interface import AnyJoint
+from problems.model.joint import Joint
 
 POINT = st.tuples(st.floats(0, 400), st.floats(0, 120))
 THREE = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, nodes=(9, 5))
@@ -44,6 +47,23 @@ def test_a_fastener_acts_where_it_is(points: list[tuple[float, float]]) -> None:
     np.testing.assert_allclose(on_a @ fields, 700 * there, rtol=1e-12, atol=700 * 400 * 120 * 2e-12)
     far = (abs(JOINT.nodes[:, None] - at) > (50.0, 30.0)).any(axis=2).all(axis=1)
     assert not on_a[far].any()  # on the nodes of its element alone
+
+
+def test_fasteners_of_many_preloads_are_weighted_once_on_each_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, preloads = ((10.0, 10.0), (90.0, 30.0), (370.0, 100.0)), (5.0, 7.0, 11.0)
+    alone = (
+        Fasteners(kind="fasteners", points=(p,), preload=n) for p, n in zip(points, preloads, strict=True)
+    )
+    wanted, asked = sum(one.force(JOINT) for one in alone), list[str]()
+
+    def deflection(self: Joint, part: str, points: Matrix, along: str = "") -> Any:
+        asked.append(part)
+        return self.weights(points)
+
+    monkeypatch.setattr(Joint, "deflection", deflection)
+    f = Fasteners(kind="fasteners", points=points, preload=preloads).force(JOINT)
+    np.testing.assert_allclose(f, wanted, rtol=0, atol=1e-13)
+    assert asked == ["a", "b"]
 
 
 def test_a_part_between_two_opens_one_gap_and_closes_the_other() -> None:
@@ -86,14 +106,14 @@ def test_a_pattern_on_nodes_has_the_nearest_of_each_axis() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rows", "edge", "most"), [(1, 200.0, None), (1, 201.0, "200 mm"), (2, 60.0, None), (2, 61.0, "60 mm")]
+    ("rows", "edge", "most"), [(1, 199.0, None), (1, 200.0, "200 mm"), (2, 59.0, None), (2, 60.0, "60 mm")]
 )
 def test_the_edge_of_a_pattern_is_bounded_along_its_rows_and_columns(
     rows: int, edge: float, most: str | None
 ) -> None:
     """On 400 × 120 mm: a single row stands in the middle, whatever the edge."""
     said = [allowed for _, _, allowed in patterned(columns=4, rows=rows, edge=edge).faults(JOINT)]
-    assert said == ([f"at most half the junction, {most}"] if most else [])
+    assert said == ([f"less than half the junction, {most}"] if most else [])
 
 
 @pytest.mark.parametrize("extra", [{}, {"points": [[1.0, 1.0]], "pattern": {"columns": 1, "rows": 1}}])
@@ -172,6 +192,31 @@ def test_shims_fill_their_rectangle_borders_included() -> None:
     expected = np.zeros((5, 9))
     expected[1:3, 1:4] = -0.3
     np.testing.assert_array_equal(g, expected)
+
+
+def test_shims_that_touch_fill_no_contact_twice() -> None:
+    """Rectangles that share a border or a corner at a node are refused, outlines add up to an even sheet."""
+
+    def shims(x: tuple[float, float], y: tuple[float, float], **more: Any) -> Shims:
+        return Shims.model_validate({"kind": "shims", "thickness": 0.2, "x": x, "y": y} | more)
+
+    def outlined(shim: Shims) -> Shims:
+        (west, east), (south, north) = shim.ranges.tolist()
+        corners = (west, south), (east, south), (east, north), (west, north)
+        return Shims(kind="shims", thickness=0.2, outline=corners)
+
+    west, east = shims((0, 150), (0, 120)), shims((150, 400), (0, 120))
+    touching = [(west, east), (outlined(west), east), (west, shims((50, 400), (120, 130)))]
+    for one, other in [*touching, (shims((0, 150), (0, 60)), shims((150, 400), (60, 120)))]:
+        for ((_, _, allowed),) in (one.faults(JOINT, [other]), other.faults(JOINT, [one])):
+            assert "no common border with other shims" in allowed
+    inside, beyond = shims((0, 50), (0, 60)), shims((151, 400), (0, 120))
+    for other in (shims((100, 400), (0, 120)), beyond, inside, outlined(east)):
+        assert not [*outlined(west).faults(JOINT, [other]), *other.faults(JOINT, [outlined(west)])]
+    even = outlined(west).gap(JOINT) + outlined(east).gap(JOINT)
+    np.testing.assert_array_equal(even, np.full(45, -0.2))
+    above = shims((0, 150), (0, 120), between=("a", "b"))
+    assert not [*above.faults(THREE, [shims((150, 400), (0, 120), between=("b", "c"))])]
 
 
 def test_a_tool_is_a_parabola_about_its_crest() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_joints import with_gap
 from strip_scene import write_strip
 
 from problems.build import load_case, prepared
@@ -14,7 +15,7 @@ from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.sweep import sweep
-from problems.model.scene import Scene
+from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
 
 RANDOM = "random = { sd = 0.2, correlation_length = 100.0, seed = 7 }"
@@ -131,6 +132,25 @@ def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, data: Prep
     assert measured_gaps(scene, path, 4).count == 4
     with pytest.raises(InputError, match="has 30 rows"):
         measured_gaps(scene, path, 31)
+
+
+def test_a_row_of_a_table_stands_for_the_gaps_that_are_measured(tmp_path: Path) -> None:
+    """A case is the scene with a scan of the row's gaps, whatever shims, position and tool it has."""
+    more = '[[effect]]\nkind = "shims"\nthickness = 0.3\nx = [0.0, 200.0]\ny = [0.0, 120.0]\n'
+    more += '[[effect]]\nkind = "part_position"\npart = "a"\nshift = 0.05\nslope_x = 1e-4\n'
+    more += '[[effect]]\nkind = "rigid_tool"\npart = "a"\ndistance = 0.2\ncurvature = [1e-6, 0.0]\n'
+    scene = read_scene(
+        str(write_strip(tmp_path, ('[[effect]]\nkind = "ribs"', more + '[[effect]]\nkind = "ribs"')))
+    )
+    assert isinstance(scene, JointScene)
+    gaps = np.random.default_rng(1).uniform(0.3, 0.9, (2, 45))
+    np.save(tmp_path / "gaps.npy", gaps)
+    cases = measured_gaps(scene, tmp_path / "gaps.npy")
+    for k, row in enumerate(gaps):
+        wanted = load_case(with_gap(scene, row))
+        np.testing.assert_allclose(cases.load(k).g, wanted.g, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(cases.load(k).f, wanted.f)
+    assert abs(cases.load(0).g - gaps[0]).max() > 0.1
 
 
 def test_the_first_gap_of_a_table_that_is_no_number_is_named(

@@ -1,6 +1,7 @@
 """Weight, heat, shifted supports and pads against beam theory and statics."""
 
 import doctest
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from small_joints import make_joint, make_scene
 
+from harness.series.load_case_source import GapCases
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.local_thickness import LocalThickness
@@ -17,6 +19,7 @@ from problems.effects.support_shift import SupportShift
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
 from problems.forms.prepared import Prepared
+from problems.load_cases.sweep import sweep
 from problems.model import effect, part
 from problems.model.effect import Effect
 from problems.model.joint import Joint
@@ -106,3 +109,20 @@ def test_a_condensed_load_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     heavier = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1235.0))
     with pytest.raises(pytest.fail.Exception, match="second time"):
         load_case(heavier)
+
+
+def test_a_load_of_many_cases_is_condensed_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linear in its key; nothing is left in the cache, and the plate is assembled once."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
+    scene = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", gravity=8.0))
+    unit, kept = load_case(scene).f / 8.0, {*tmp_path.iterdir()}
+    drawn = GapCases(count=3, random=("self_weight.gravity=normal(9.8, 0.1)",)).of(scene, "dual")
+    swept = sweep(scene, ["self_weight.gravity=9:11:3"])
+    assert kept
+    assert len({swept.load(0).f.tobytes(), drawn.load(0).f.tobytes()}) == 2
+    monkeypatch.setattr(part.PartModel, "stiffness", lambda *_: pytest.fail("assembled a second time"))
+    for cases in (drawn, swept):
+        for k in range(3):
+            gravity = cases.parameters(k)["self_weight.gravity"]
+            np.testing.assert_allclose(cases.load(k).f, gravity * unit, rtol=1e-9, atol=1e-12)
+    assert {*tmp_path.iterdir()} == kept

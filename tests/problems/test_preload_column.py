@@ -141,6 +141,15 @@ def test_series_and_answers_keep_it_and_place_refuses_it(tmp_path: Path) -> None
         ('kind = "installed_fasteners"', table("preload,stage,stage"), "preload, stage, once each"),
         ('kind = "installed_fasteners"\npreload = [1, 2]', "x,y\n20,10\n", "one for each of 1 points"),
         ('kind = "clamps"\nclamping_force = 5\ncolumns = { preload = "F" }', table("F"), "columns"),
+        *(
+            (effect, table(heading), f"header = '{heading}': no column {name}: a file has x, y")
+            for effect, heading, name in (
+                ('kind = "installed_fasteners"', "Approach [mm]", "approach"),
+                ('kind = "installed_fasteners"', "stiffness_N/mm", "stiffness"),
+                ('kind = "clamps"\nclamping_force = 5', "clamping force (N)", "clamping_force"),
+                ('kind = "fasteners"\npreload = 5', "Between", "between"),
+            )
+        ),
     ],
 )
 def test_bad_preloads_are_refused(tmp_path: Path, effect: str, holes: str, said: str) -> None:

@@ -121,6 +121,44 @@ def test_a_sweep_shifts_all_points(scene: Scene, tmp_path: Path) -> None:
     np.testing.assert_array_equal(moved.f, load_case(read_scene(str(wanted))).f)
 
 
+def patterned(folder: Path, name: str = "", stages: str = "") -> Scene:
+    pattern = f"{name}pattern = {{ columns = 3, rows = 2, edge = 20.0 }}"
+    path = write_strip(folder, ("points = [[50.0, 30.0], [200.0, 0.0], [350.0, 60.0]]", pattern))
+    path.write_text(path.read_text() + stages)
+    return read_scene(str(path))
+
+
+def test_a_shift_moves_the_points_of_the_pattern_that_is_drawn(tmp_path: Path) -> None:
+    """Whatever the order of the keys."""
+    scene, edge, shift = patterned(tmp_path), "fasteners.pattern.edge", "fasteners.points.x"
+    assert isinstance(scene, JointScene)
+    laws = f"{edge}=uniform(20, 10)", f"{shift}=uniform(-5, 10)"
+    for cases in (drawn(scene, *laws), drawn(scene, *laws[::-1])):
+        row, fasteners = cases.parameters(3), scene.effects[1]
+        pattern = fasteners.pattern.model_copy(update={"edge": row[edge]})  # type: ignore[attr-defined]
+        moved = np.array([row[shift], 0.0])
+        marks = fasteners.model_copy(update={"pattern": pattern}).marks(scene.joint) + moved
+        alone = fasteners.model_copy(update={"points": tuple(map(tuple, marks)), "pattern": None})
+        wanted = load_case(scene, "dual", [alone, *scene.effects[2:]])
+        np.testing.assert_allclose(cases.load(3).f, wanted.f, rtol=0, atol=1e-12)
+    swept = sweep(scene, [f"{shift}=-5,5", f"{edge}=20,30"]), sweep(scene, [f"{edge}=20,30", f"{shift}=-5,5"])
+    np.testing.assert_array_equal(swept[0].load(1).f, swept[1].load(2).f)
+    assert abs(swept[0].load(1).f - swept[0].load(0).f).max() > 0.1
+
+
+def test_a_pattern_whose_points_act_one_by_one_is_not_drawn(tmp_path: Path) -> None:
+    law, told = "fasteners.pattern.edge=uniform(20, 10)", "fasteners.pattern.edge: key = 'fasteners.pattern"
+    scene = patterned(tmp_path)
+    for laws in ((law.replace("=", "=each "),), (law, "fasteners.points.x=each uniform(0, 1)")):
+        with pytest.raises(InputError, match=f"--random {told}.*one by one"):
+            drawn(scene, *laws)
+    stages = '[[stage]]\nname = "1"\non = ["tacks[0:2]"]\n[[stage]]\nname = "2"\non = ["tacks[2:6]"]\n'
+    with pytest.raises(InputError, match=f"--random {told}.*one by one"):
+        drawn(patterned(tmp_path, 'name = "tacks"\n', stages), law)
+    together = '[[stage]]\nname = "1"\non = ["tacks"]\n'
+    assert drawn(patterned(tmp_path, 'name = "tacks"\n', together), law).count == 20
+
+
 BAD = [
     ("fasteners.preload=normal(60, 12)", "must be greater than 0"),  # its 1e-9 quantile is below 0
     ("fasteners.preload=normal(60, -5)", "a scale above 0"),

@@ -149,6 +149,15 @@ def test_each_part_is_in_equilibrium_in_each_stage() -> None:
         assert stage.forces["contacts"] == pytest.approx(stage.lam.sum())
 
 
+def test_a_clamp_through_a_stack_counts_once_and_a_rivet_in_each_contact() -> None:
+    stack = JOINT | {"part": [*JOINT["part"], PART | {"name": "c"}]}
+    (stage,) = solve(joined([CLAMP], EFFECTS[:3], stack)).stages
+    springs = [one for one in fastener_forces(stage.scene, stage.x) if one["kind"] == "installed_fasteners"]
+    assert len(springs) == 2 * len(RIVETS)
+    assert stage.forces["clamps"] == 2 * 90.0
+    assert stage.forces["rivets"] == pytest.approx(sum(one["force_N"] for one in springs))
+
+
 def test_superelements_go_through_the_same_stages(tmp_path: Path) -> None:
     plates = joined(ONCE)
     nodes = np.column_stack([plates.joint.nodes_of("a"), np.zeros(45)])
@@ -238,7 +247,24 @@ def test_the_stage_of_a_point_may_stand_in_its_file(tmp_path: Path) -> None:
         joined(stages[:2], effects)
 
 
+def test_effects_of_a_scene_keep_the_stages_of_their_points(tmp_path: Path) -> None:
+    """A scene made of the effects of another has its stages; more points than these are refused."""
+    (tmp_path / "rivets.csv").write_text("x,y,stage\n60,20,first\n140,30,second\n")
+    from_file = {"kind": "installed_fasteners", "file": str(tmp_path / "rivets.csv")}
+    scene = joined([CLAMP, {"name": "first"}, {"name": "second"}], [*EFFECTS[:2], from_file])
+    table = {"joint": scene.joint, "effect": list(scene.effects), "stage": list(scene.stages)}
+    again = joint_scene(table)
+    assert [one.key for one in stage_scenes(again).values()] == [
+        one.key for one in stage_scenes(scene).values()
+    ]
+    assert len(stage_scenes(again)["clamp"].effects) == 2
+    more = scene.effects[2].model_copy(update={"points": tuple(map(tuple, RIVETS))})
+    with pytest.raises(InputError, match=r"points = '4 points': 2 points: the column stage"):
+        joint_scene(table | {"effect": [*scene.effects[:2], more]})
+
+
 PIN = [[390.0, 100.0]]
+HALVES = [{"name": "1", "on": ["rivets[2:4]"]}, {"name": "2", "on": ["rivets[0:2]"]}]
 SUPPORTS = [[0.0, 10.0], [400.0, 10.0], [200.0, 200.0]]
 BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"name": "1", "on": ["clamp"]}], {}, "stage[0] (1).on = 'clamp'", "did you mean clamps?"),
@@ -277,6 +303,8 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ),
     ([CLAMP], {"approach": [0.1, 0.2]}, "approach", "one for each of 4 springs"),
     ([CLAMP], {"preload": -1.0}, "preload", "in N"),
+    (HALVES, {"preload": [1.0, 2.0, 3.0]}, "effect[2] (installed_fasteners).preload", "each of 4 points"),
+    (HALVES, {"points": [*RIVETS[:3], RIVETS[2]]}, "points[3] = [210.0, 20.0]", "points[2] is there, too"),
     (
         [{"name": "hold", "on": ["legs"]}, {"name": "let go", "off": ["legs[0:2]"]}],
         {},
@@ -342,3 +370,19 @@ def test_two_files_of_effects_of_one_kind_without_names(tmp_path: Path) -> None:
     assert counts == [0, 2, 4]
     (warning,) = joined([], effects[:3]).unusual
     assert warning.startswith("installed_fasteners.stage = a column is unusual")
+
+
+def test_some_points_of_a_file_keep_their_lines_and_stages(tmp_path: Path) -> None:
+    (tmp_path / "rivets.csv").write_text("x,y,stage\n60,20,first\n140,30,second\n210,20,first\n")
+    from_file = {"kind": "installed_fasteners", "file": str(tmp_path / "rivets.csv")}
+    scene = joined([CLAMP, {"name": "first"}, {"name": "second"}], [*EFFECTS[:2], from_file])
+    some = stage_scenes(scene)["first"].effects[2]
+    assert [some.point_name(k) for k in range(2)] == ["rivets.csv, line 2", "rivets.csv, line 4"]
+    assert some._stages == ("first", "first")
+
+
+def test_an_approach_of_another_length_that_stages_divide_is_refused() -> None:
+    with pytest.raises(InputError) as error:
+        joined(HALVES, [*EFFECTS[:2], EFFECTS[2] | {"approach": [0.1] * 3}])
+    allowed = [fault.allowed for fault in error.value.faults]
+    assert [allowed[0], allowed[1][:8]] == ["one number, or one for each of 4 springs", "left out"]

@@ -72,7 +72,7 @@ def test_a_condensed_plate_has_the_plates_stresses(tmp_path: Path) -> None:
     scene = scene_of({"joint": joint.model_dump(exclude_unset=True), "effect": EFFECTS})
     plates = stresses(solve(scene, form="sparse"))
     largest = max(part.von_mises.max() for part in plates.parts)
-    assert largest > 1.0
+    assert largest > 0.1
     scene = scene_from(condensed(tmp_path, joint), *EFFECTS)
     for form in ("dual", "sparse"):
         found = stresses(solve(scene, form=form))
@@ -252,3 +252,18 @@ def test_validate_reads_what_the_scene_asks_for(tmp_path: Path) -> None:
     assert "S.shape" in done.output
     (tmp_path / "j.toml").write_text(TOML.replace("stress = true", ""), "utf-8")
     assert harness("validate", tmp_path / "j.toml").exit_code == 0
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_the_history_has_the_largest_stress_of_each_stage(tmp_path: Path) -> None:
+    """None before anything presses, that of the answer at the end."""
+    point_matrix(tmp_path, np.arange(36.0).reshape(6, 6), TWO)
+    text = TOML.replace('kind = "fasteners"', 'kind = "fasteners"\nname = "tacks"')
+    text += '[[stage]]\nname = "lie"\n[[stage]]\nname = "tack"\non = ["tacks"]\n'
+    (tmp_path / "j.toml").write_text(text, "utf-8")
+    done = harness("solve", tmp_path / "j.toml", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "out/solution.json").read_text("utf-8"))
+    largest = record["stress"]["largest"]["von_mises"]
+    assert largest > 0.1
+    assert [stage["largest_stress"] for stage in record["stages"]] == [0.0, pytest.approx(largest)]

@@ -15,6 +15,7 @@ from small_joints import make_scene
 from superelements import Array, Tables, flat, scene_from, solved, stiffnesses, two_plates, write_part
 
 from problems.build import load_case, model_of, prepared
+from problems.effects.part_position import PartPosition
 from problems.errors import InputError
 from problems.model.contact_pairing import Face, paired
 from problems.model.scene import JointScene
@@ -280,6 +281,33 @@ def test_contacts_of_curved_surfaces_are_along_their_normals(tmp_path: Path) -> 
         radial[joint.unknowns(name)] = part.nodes.normal.ravel()
         np.testing.assert_allclose(A.T @ radial, sign, atol=1e-3)
     assert solved(scene).gap.min() > -1e-9
+
+
+def test_a_part_off_its_place_moves_as_a_rigid_body_along_inclined_normals(tmp_path: Path) -> None:
+    """By Aᵀx of the motion of all its nodes; a shift by the cosine of each normal, half of it at 60°."""
+    R, y, parts, end = rotation(), np.linspace(0.0, 50.0, 6), [], np.pi / 3
+    for name, radius, angles in (
+        ("a", 200.0, np.linspace(-end, end, 25)),
+        ("b", 202.0, np.linspace(-end - 0.1, end + 0.1, 41)),
+    ):
+        xyz, normals = cylinder(radius, angles, y)
+        xyz, normals = xyz @ R.T + [3e3, -2e3, 500.0], normals @ R.T
+        parts.append(write_part(tmp_path, name, np.eye(3 * len(xyz)), xyz, normals, dofs=[1, 2, 3]))
+    joint = scene_from(parts).joint
+    A, axes = joint.contact_matrix(), joint.axes
+    places = [part.nodes.xyz @ axes.T for part in joint.parts]
+    centre = np.array([np.vstack(places).min(axis=0), np.vstack(places).max(axis=0)]).mean(axis=0)
+    shift, slope_x, slope_y = 0.3, 2e-3, -1e-3
+    for name, at in zip("ab", places, strict=True):
+        table = {"kind": "part_position", "part": name, "shift": shift}
+        moved = np.array([0.0, 0.0, shift]) + np.cross([slope_y, -slope_x, 0.0], at - centre)
+        x = np.zeros(A.shape[0])
+        x[joint.unknowns(name)] = (moved @ axes).ravel()
+        tilted = PartPosition.model_validate(table | {"slope_x": slope_x, "slope_y": slope_y})
+        np.testing.assert_allclose(tilted.gap(joint), -A.T @ x, rtol=0, atol=1e-12)
+        lifted, cosine = PartPosition.model_validate(table).gap(joint), joint.parts[0].nodes.normal @ axes[2]
+        np.testing.assert_allclose(abs(lifted), shift * cosine, rtol=0, atol=1e-12)
+        assert abs(lifted).min() == pytest.approx(0.15, rel=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [40, 50, 80])
