@@ -90,10 +90,14 @@ def check(
     """
     with error_reporting(interrupted="Interrupted.") as console:
         from harness.conformance.isolated import run as run_checks
+        from problems.errors import InputError
         from solvers.registry import modules
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         names = solver or ([plugin.stem] if plugin else list(modules()))
+        if plugin and plugin.stem not in names:
+            allowed = f"{plugin.stem} among them, that of --plugin {plugin}"
+            raise InputError.one("--solver", "names", " ".join(names), allowed)
         raise typer.Exit(run_checks(names, plugin, time_limit, memory_limit, console))
 
 

@@ -93,6 +93,9 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
         data["solver"] = [entry for entry in data["solver"] if entry["name"] in solvers]
     named = {entry["name"] for entry in data["solver"]}
     plugins = [change.plugin.stem] if change.plugin and not solvers else []
+    if change.plugin and solvers and change.plugin.stem not in solvers:
+        allowed = f"{change.plugin.stem} among them, that of --plugin {change.plugin}"
+        faults.append(Fault("--solver", "names", " ".join(solvers), allowed))
     data["solver"] += [{"name": name} for name in (*solvers, *plugins) if name not in named]
     data["solver"] = [entry | at for entry in data["solver"] for at in versions.get(entry["name"], [{}])]
     changes = {
