@@ -197,11 +197,13 @@ def refuse_other_command(directory: Path, own: str, outputs: Sequence[str] = ())
 
 
 @contextmanager
-def locked(directory: Path, own: str = MEASUREMENTS, folders: Sequence[str] = ()) -> Iterator[None]:
+def locked(
+    directory: Path, own: str = MEASUREMENTS, folders: Sequence[str] = (), outputs: Sequence[str] = ()
+) -> Iterator[None]:
     """Create the directory and lock it against a second run. Raises InputError if that fails, or as
     `refuse_other_command`.
     """
-    refuse_other_command(directory, own)
+    refuse_other_command(directory, own, outputs)
     try:
         for folder in ("", *folders):
             (directory / folder).mkdir(parents=True, exist_ok=True)
