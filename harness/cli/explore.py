@@ -1,5 +1,6 @@
 """The command `explore`: a page on which fasteners move."""
 
+import threading
 import webbrowser
 from typing import Annotated
 
@@ -44,6 +45,7 @@ def explore(
         def ready(address: str) -> None:
             console.print(f"{address}  (Ctrl-C ends it)")
             if open_browser:
-                webbrowser.open(address)
+                # A browser in the terminal returns when it ends, and its page has to be served until then.
+                threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
         serve(explorer, scene, allow_gap, first, ready)

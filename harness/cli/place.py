@@ -52,8 +52,7 @@ def place(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
         from harness.placement.run import place as place_fasteners
-        from harness.terminal import DONE, GAP_EXCEEDED
-        from harness.terminal.console import ConsoleReporter
+        from harness.terminal.console import ConsoleReporter, show_verdict
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         placement = place_fasteners(
@@ -68,6 +67,5 @@ def place(
             reporter=ConsoleReporter(console, plain=True),
         )
         console.print(f"Report: {placement.report}")
-        style = "green" if placement.passed else "red"
-        console.print(placement.sentence, style=style, soft_wrap=True)
-        raise typer.Exit(DONE if placement.passed else GAP_EXCEEDED)
+        kind = "pass" if placement.passed else "fail"
+        raise typer.Exit(show_verdict(kind, [placement.sentence], console))

@@ -1,6 +1,5 @@
 """The commands for a scene: init, validate, solve."""
 
-import os
 import shlex
 from pathlib import Path
 from string import Template
@@ -168,9 +167,11 @@ def init(
 
 def _of_parts(parts: list[Path], scene: Path) -> dict[str, str]:
     """What the scene says of parts whose K are in these files, their nodes beside them."""
+    from harness.scene.scene_file import relative
+
     tables = ""
     for part in parts:
-        there = Path(os.path.relpath(part, scene.parent)).as_posix()
+        there = relative(part, scene.parent)
         nodes = Path(there).with_suffix(".csv").as_posix()
         files = f"superelement = {_quoted(there)}\nnodes = {_quoted(nodes)}\n"
         tables += f"[[joint.part]]\nname = {_quoted(part.stem)}\n{files}"

@@ -56,8 +56,7 @@ def shim(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
         from harness.shimming.run import shim as find_shims
-        from harness.terminal import DONE, GAP_EXCEEDED
-        from harness.terminal.console import ConsoleReporter
+        from harness.terminal.console import ConsoleReporter, show_verdict
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         shims = find_shims(
@@ -76,5 +75,5 @@ def shim(
             reporter=ConsoleReporter(console, plain=True),
         )
         console.print(f"Report: {shims.report}")
-        console.print(shims.sentence, style="green" if shims.passed else "red", soft_wrap=True)
-        raise typer.Exit(DONE if shims.passed else GAP_EXCEEDED)
+        kind = "pass" if shims.passed else "fail"
+        raise typer.Exit(show_verdict(kind, [shims.sentence], console))

@@ -25,6 +25,7 @@ from harness.results import records, series_file
 from harness.results.atomic_output import refuse_inputs
 from harness.results.records import TOLERANCE
 from harness.scene.allowed_gap import CONFIDENCE, SHARE, refuse_unusable, share_interval
+from harness.scene.solution import Source, load_scene
 from harness.series.load_case_source import DEFAULT, GapCases
 from harness.series.session import SeriesOptions
 from harness.solving.call_lock import keeps_threads
@@ -34,7 +35,6 @@ from problems.forms.assembly import Vector
 from problems.load_cases.sweep import keys_of
 from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter
-from problems.scene_files import read_scene
 from report.document.numbers import out_of
 
 from .load_case_series import run_series
@@ -69,7 +69,7 @@ class Tolerance:
 
 @keeps_threads
 def tolerance(
-    scene: str | Path,
+    scene: Source,
     out: str | Path,
     find: str,
     allow_gap_mm: float,
@@ -84,8 +84,8 @@ def tolerance(
 
     Parameters
     ----------
-    scene : str or Path
-        Name of a scene, or the path of its file.
+    scene : Scene, str, Path or dict
+        The scene, its name, the path of its file, or the content of its file.
     out : str or Path
         Directory with a series of each value: the same call continues what was interrupted.
     find : str
@@ -124,7 +124,7 @@ def tolerance(
     >>> most.interval[0] <= most.value < most.interval[1]
     True
     """
-    read, directory = read_scene(str(scene)), Path(out)
+    read, directory = load_scene(scene), Path(out)
     share, resolution = SHARE if share is None else share, RESOLUTION if resolution is None else resolution
     keys = keys_of(read, stiffness=True) if isinstance(read, JointScene) else {}
     name, _, ends = find.partition("=")

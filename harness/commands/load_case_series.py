@@ -15,6 +15,7 @@ from harness.results.provenance import fingerprints
 from harness.results.records import Row, to_line
 from harness.results.schema import SERIES
 from harness.scene.allowed_gap import check_series, refuse_unusable
+from harness.scene.solution import Source, load_scene
 from harness.series.derivatives import derivatives
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
@@ -25,9 +26,7 @@ from harness.terminal.console import console_of
 from problems.errors import Fault, InputError
 from problems.load_cases import LoadCases
 from problems.load_cases.sweep import sweep as swept
-from problems.model.scene import Scene
 from problems.reporter import SILENT, Reporter
-from problems.scene_files import read_scene
 from solvers.plugin import unused
 
 STANDARD = SeriesOptions()
@@ -66,7 +65,7 @@ class SeriesOutcome:
 
 @keeps_threads
 def run_series(
-    scene: str | Path | Scene,
+    scene: Source,
     out: str | Path,
     cases: GapCases = DEFAULT,
     options: SeriesOptions = STANDARD,
@@ -81,8 +80,8 @@ def run_series(
 
     Parameters
     ----------
-    scene : str, Path or Scene
-        Name of a scene, the path of its file, or a scene that was read.
+    scene : Scene, str, Path or dict
+        The scene, its name, the path of its file, or the content of its file.
     out : str or Path
         The directory; the same call continues what was interrupted, more cases extend it.
     cases : GapCases, optional
@@ -119,12 +118,18 @@ def run_series(
     """
     directory, solver = Path(out), options.solver
     refuse_unusable(allow_gap_mm)
-    read = scene if isinstance(scene, Scene) else read_scene(str(scene))
+    read = load_scene(scene)
     cases = cases if sweep else replace(cases, random=cases.laws(read))
     faults = cases.faults(sweep)
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
     faults += unused(options.plugin, [solver])
+    for name, value, usual in (
+        ("time-limit", options.time_limit_s, STANDARD.time_limit_s),
+        ("memory-limit", options.memory_limit_mib, STANDARD.memory_limit_mib),
+    ):
+        if value != usual and not options.plugin:
+            faults.append(Fault(f"--{name}", "limit", value, "with --plugin, whose solver alone is ended"))
     (made,) = described([(solver, {})], options.plugin, "--solver", reporter)
     if options.form and options.form not in made.forms:
         faults.append(Fault("--form", "form", options.form, f"{solver} takes {' and '.join(made.forms)}"))

@@ -17,6 +17,7 @@ from harness.placement.candidates import movable_fasteners
 from harness.planning.form_choice import chosen_form
 from harness.scene.scene_file import MOVED, of_kind, with_fasteners
 from harness.scene.solution import Source, load_scene
+from harness.solving.call_lock import in_turn
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
@@ -173,6 +174,7 @@ class Explorer:
     True
     """
 
+    @in_turn
     def __init__(self, scene: Source, form: Form | None = None) -> None:
         joint_scene = load_scene(scene)
         self.settings = Settings.of(joint_scene)
@@ -188,6 +190,7 @@ class Explorer:
         self.sessions.append(next(shared, None) or _Session(part, self.form))
         return lambda T: np.zeros((T.shape[1], 1)), None
 
+    @in_turn
     def answer(self, settings: Settings, near: LiveAnswer | None = None) -> LiveAnswer:
         """Solve the scene with other settings, to about 1e-5 mm.
 
@@ -210,6 +213,7 @@ class Explorer:
         """
         return self._through(settings, near, proven=False)
 
+    @in_turn
     def proven(self, answer: LiveAnswer) -> LiveAnswer:
         """Refine an answer, and prove how far its gaps may be off.
 

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict
+from contextlib import suppress
+from dataclasses import asdict, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from harness.placement.session import Outcome, Question, Study, answer
 from harness.results import records
 from harness.results.records import to_line
 from problems.errors import InputError
+from problems.forms import Form
 from problems.storage import digest
 
 
@@ -45,17 +47,29 @@ class AnswerJournal:
             for text, question in new.items():
                 self._keep(text, question, answer((self.study, question)))
         else:
-            tasks = ((text, (self.study, question)) for text, question in new.items())
+            tasks = ((text, (self._part(question), question)) for text, question in new.items())
             for text, outcomes in done_as_completed(*self.pool, answer, tasks):
                 if isinstance(outcomes, BaseException):
                     raise outcomes
                 self._keep(text, new[text], outcomes)
         return [self.answers[text] for text in texts]
 
+    def _part(self, question: Question) -> Study:
+        """The study with the data of the cases of a question alone, for a worker."""
+        return replace(self.study, cases=self.study.cases.only(question.cases))
+
     def _keep(self, text: str, question: Question, outcomes: list[Outcome]) -> None:
         row = {"question": asdict(question), "outcomes": list(map(asdict, outcomes))}
         records.append(self.path, row | {"hash": digest(to_line(row))})
         self.answers[text] = outcomes
+
+
+def recorded_form(path: Path, forms: Sequence[Form]) -> Form | None:
+    """The form of the answers in a journal, if it is one of `forms`; None without a journal."""
+    with suppress(OSError, ValueError), path.open("rb") as file:
+        form = records.parsed(file.readline()).get("form")
+        return next((one for one in forms if one == form), None)
+    return None
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:

@@ -108,7 +108,15 @@ class PlanSearch(ABC):
             for of_plan in zip(*answers, strict=True)
         ]
 
+    def value(self, outcome: Outcome) -> tuple[float, float]:
+        """φ: max(G, limit) and the mean over the cases, mm, rounded."""
+        mean = float(np.mean(outcome.mean))
+        return round(max(self.gap(outcome), self.limit_mm), DIGITS), round(mean, DIGITS)
+
     def deciding(self, step: Step) -> tuple[int, ...]:
         """The worst cases of a plan, by their numbers."""
-        worst = sorted(range(self.cases), key=lambda k: (-round(step.outcome.largest[k], DIGITS), k))
-        return tuple(sorted(worst[: 2 * self.allowed + MORE_CASES]))
+        return tuple(sorted(self.worst_first(step)[: 2 * self.allowed + MORE_CASES]))
+
+    def worst_first(self, step: Step) -> list[int]:
+        """The numbers of all cases, that in which a plan leaves most first."""
+        return sorted(range(self.cases), key=lambda k: (-round(step.outcome.largest[k], DIGITS), k))

@@ -14,7 +14,7 @@ import pandas as pd
 
 from harness.measurement.scheduler import workers
 from harness.measurement.solver_descriptions import described
-from harness.placement.answer_journal import AnswerJournal
+from harness.placement.answer_journal import AnswerJournal, recorded_form
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
 from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
 from harness.placement.search import Search
@@ -25,7 +25,8 @@ from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints
 from harness.scene.allowed_gap import refuse_unusable
-from harness.scene.scene_file import MOVED, edited, with_fasteners
+from harness.scene.scene_file import MOVED, edited, file_of, with_fasteners
+from harness.scene.solution import Source, load_scene
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
@@ -77,7 +78,7 @@ class Placement:
 
 @keeps_threads
 def place(
-    scene: str | Path,
+    scene: Source,
     out: str | Path,
     *,
     candidates: str | Path | None = None,
@@ -92,8 +93,8 @@ def place(
 
     Parameters
     ----------
-    scene : str or Path
-        Name of a scene, or the path of its file, with fasteners of one preload.
+    scene : Scene, str or Path
+        A scene that was read, its name, or the path of its file, with fasteners of one preload.
     out : str or Path
         Directory for the plan (plan.toml, plan.csv), the report and the answers so far: the same call
         continues an interrupted search.
@@ -131,15 +132,15 @@ def place(
     >>> best.plan
     ((40.0, 30.0), (280.0, 30.0))
     """
-    source, directory = str(scene), Path(out)
+    read, directory = load_scene(scene), Path(out)
     refuse_unusable(allow_gap_mm)
-    inputs = [Path(file) for file in (scene, candidates, *cases.files) if file]
-    read, report_files = read_scene(source), (directory / "report").glob("*")
-    refuse_inputs([*(directory / name for name in OUTPUTS), *report_files], [*read.sources, *inputs])
-    movable = MovableFasteners.of(read)
+    inputs = [*read.sources, *(Path(file) for file in (candidates, *cases.files) if file)]
+    report_files = (directory / "report").glob("*")
+    refuse_inputs([*(directory / name for name in OUTPUTS), *report_files], inputs)
+    movable, source = MovableFasteners.of(read), file_of(scene, read)
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
     single = cases.are_one(movable.bare)
-    faults = cases.faults(table=None if candidates is None else str(candidates))
+    faults = cases.faults(table=candidates is not None and Path(candidates).is_file())
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
     if count is not None and not 0 < count <= len(holes):
@@ -152,7 +153,8 @@ def place(
         raise InputError(faults)
     (newton,) = described([("newton", {})], None, "--solver", reporter)
     number = 1 if single else cases.count or RANDOM
-    form = chosen_form(movable.scene, newton.forms, None, number * len(holes)).form
+    wanted = recorded_form(directory / records.PLANS, newton.forms)
+    form = chosen_form(movable.scene, newton.forms, wanted, number * len(holes)).form
     study = FastenerStudy(movable.bare, cases.of_search(movable.scene, form), form, movable)
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
@@ -167,14 +169,13 @@ def place(
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
-    records.refuse_other_command(directory, records.PLANS, (*OUTPUTS, *SERIES, "report"))
     if order.table:
         reporter.say(HELD_BACK)
-    nodes = prepared(study.bare, form=form).assembly.contact_nodes
-    assert nodes is not None  # of a joint
     console = console_of(reporter)
-    with records.locked(directory, records.PLANS):
+    with records.locked(directory, records.PLANS, outputs=(*OUTPUTS, *SERIES, "report")):
         scene_of(tomllib.loads(current), str(directory / "own.toml"))  # as is refused at the end
+        nodes = prepared(study.bare, form=form).assembly.contact_nodes
+        assert nodes is not None  # of a joint
         pool = workers(scheduler, console) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
             journal = AnswerJournal(study, directory / records.PLANS, identity, executor)
@@ -197,7 +198,7 @@ def place(
         words, passed = sentence_on(result, goal, nodes)
         record = record_of(study, movable.current, holes, goal, result, nodes)
         labels = [names.get(place, "") for place in holes]
-        files = fingerprints([*study.bare.sources, *(file for file in inputs[1:] if file.is_file())])
+        files = fingerprints(file for file in inputs if file.is_file())
         told = {"said": words, "names": labels, "inputs": files}
         records.replace_object(directory / RECORD, record | told)
         steps = zip(result.order[1:], result.order, strict=False)

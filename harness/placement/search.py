@@ -28,10 +28,8 @@ from itertools import combinations, islice
 from math import comb, dist
 from typing import TypeAlias
 
-import numpy as np
-
 from harness.placement.candidates import Place, Plan, uniform_plans
-from harness.placement.plan_search import DIGITS, ESTIMATED, PlanSearch, Step
+from harness.placement.plan_search import ESTIMATED, PlanSearch, Step
 from problems.forms.assembly import Matrix
 from problems.model.scene import JointScene
 
@@ -205,13 +203,7 @@ class Search(PlanSearch):
     def _values(self, step: Step, plans: Sequence[Plan], cases: tuple[int, ...] = ()) -> list[Value]:
         """φ of other plans, estimated in `cases`, by default the worst ones of the step."""
         outcomes = self.outcomes(plans, cases or self.deciding(step), ESTIMATED, step.plan)
-        return [
-            (
-                round(max(self.gap(outcome), self.limit_mm), DIGITS),
-                round(float(np.mean(outcome.mean)), DIGITS),
-            )
-            for outcome in outcomes
-        ]
+        return [self.value(outcome) for outcome in outcomes]
 
 
 def without(plan: Plan, gone: Place) -> Plan:

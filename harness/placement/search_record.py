@@ -8,7 +8,7 @@ from harness.placement.candidates import Plan
 from harness.placement.fresh_cases import CONFIDENCE, Found, Goal
 from harness.placement.plan_search import Step
 from harness.placement.session import FastenerStudy
-from harness.results.provenance import installed_version, provenance
+from harness.results.provenance import stamp
 from problems.forms.assembly import Matrix
 from problems.storage import digest
 from report.document.numbers import counted, position
@@ -20,12 +20,8 @@ def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goa
     return {
         **asdict(goal),
         **{name: f"{counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
-        "scene_key": study.scene.key,
         "fastener": study.movable.fastener.model_dump(mode="json", include={"preload", "between"}),
-        "cases_key": study.cases.content_key,
-        "cases": study.cases.count,
-        "form": study.form,
-        "rivetbench_version": installed_version("rivetbench"),
+        **study.identity,
     }
 
 
@@ -68,8 +64,7 @@ def record_of(
         "best": None if result.best is None else entry(result.best),
         "order": [entry(step) for step in result.order],
         "scene_key": scene.key,
-        "version": installed_version("rivetbench"),
-        **provenance(),
+        **stamp(),
     }
 
 

@@ -15,6 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
+from typing import Any
 from uuid import uuid4
 
 import numpy as np
@@ -22,6 +23,7 @@ import scipy.sparse as sp
 import threadpoolctl
 
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
+from harness.results.provenance import installed_version
 from harness.scene.stress import sensitivities
 from harness.series.session import BLOCK, BLOCK_BYTES
 from harness.series.staged import OpenStage, OpenStages, StageCases
@@ -58,6 +60,17 @@ class Study(ABC):
     def scene(self) -> JointScene:
         """The scene whose stages a plan goes through."""
         return self.bare
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What decides the outcome of a plan."""
+        return {
+            "scene_key": self.scene.key,
+            "cases_key": self.cases.content_key,
+            "cases": self.cases.count,
+            "form": self.form,
+            "rivetbench_version": installed_version("rivetbench"),
+        }
 
     def bare_stage(self, part: JointScene, plan: Plan) -> tuple[JointScene, Plan]:
         """What acts in a stage but the items, and the items that do."""
@@ -215,11 +228,13 @@ class CaseAnswer:
 
 
 class PlanSession:
-    """Answers questions of one study; its matrices are made once. last : of the last stage."""
+    """Answers questions of one study; its matrices are made once. last : of the last stage. cases : those of
+    the study, or of the question.
+    """
 
     def __init__(self, study: Study) -> None:
         threadpoolctl.threadpool_limits(THREADS)
-        self.study = study
+        self.study, self.cases = study, study.cases
         self.stages = OpenStages(study.bare, study.form, partial(StiffnessSession, study))
         self.last, self.scene = self.stages.of(study.bare).session, study.cases.staged(study.scene)
         self.loads: dict[tuple[OpenStage[StiffnessSession], int], DualLoadCase] = {}
@@ -234,9 +249,11 @@ class PlanSession:
         blocks = (self._outcomes(plans[k : k + size], cases, starts) for k in range(0, len(plans), size))
         return [outcome for block in blocks for outcome in block]
 
-    def gaps(self, numbers: Sequence[int]) -> Matrix:
-        """An estimate of the gaps (m, k) that no item leaves in some cases, mm."""
-        return self.answers([()], numbers, ESTIMATE_MM)[-1].vectors[1]
+    def largest_gap(self, numbers: Sequence[int]) -> Vector:
+        """An estimate of the largest gap in any of some cases without items, (m,) mm."""
+        blocks = (numbers[k : k + self.block] for k in range(0, len(numbers), self.block))
+        gaps = (self.answers([()], block, ESTIMATE_MM)[-1].vectors[1] for block in blocks)
+        return np.max([gap.max(axis=1) for gap in gaps], axis=0)
 
     def _outcomes(
         self, plans: Sequence[Plan], numbers: tuple[int, ...], starts: list[StageAnswers]
@@ -303,7 +320,7 @@ class PlanSession:
         stage = self.stages.of(bares[0])
         session, K = stage.session, stage.session.data.assembly
         if new := [k for k in numbers if (stage, k) not in self.loads]:
-            of_stage = StageCases(self.study.cases, stage)
+            of_stage = StageCases(self.cases, stage)
             made = session.data.with_p([of_stage.load(k) for k in new])
             self.loads |= {(stage, k): load for k, load in zip(new, made, strict=True)}
         locking, overlap = stage.locking(K, approaches), np.zeros((K.m, approaches.shape[1]))
@@ -331,4 +348,6 @@ def answer(task: tuple[Study, Question]) -> list[Outcome]:
     if study.key not in _sessions:
         _sessions.clear()
         _sessions[study.key] = PlanSession(study)
-    return question.answered(_sessions[study.key])
+    session = _sessions[study.key]
+    session.cases = study.cases  # those of this question
+    return question.answered(session)

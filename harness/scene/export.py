@@ -40,6 +40,8 @@ from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from report.document.numbers import counted
 
+from .solution import Source, load_scene
+
 Arrays = dict[str, Any]
 #: The columns of a test set, https://github.com/qpsolvers/qpbenchmark; matrices are dense, row by row.
 AT_ONCE = 2**20  # lines of a text
@@ -47,7 +49,7 @@ TEST_SET = ("P", "q", "G", "h", "A", "b", "lb", "ub", "name")
 
 
 def export(
-    scene: str | Path,
+    scene: Source,
     out: str | Path,
     *,
     format: str | None = None,
@@ -60,8 +62,9 @@ def export(
 
     Parameters
     ----------
-    scene : str or Path
-        Name of a scene, or the path of its file; of a suite, where `out` is a .parquet.
+    scene : Scene, str, Path or dict
+        The scene, its name, the path of its file, or its content; the name of a suite, where `out` is a
+        .parquet.
     out : str or Path
         A file, or a folder for a format of several files; with a form .npz, .mps, .qps or a folder.
     format : str, optional
@@ -94,6 +97,8 @@ def export(
     out = Path(out)
     if form is None and with_reference:
         raise InputError.one("--with-reference", "form", None, "needs --form: primal, dual or sparse")
+    if reference_limit_s is not None and not with_reference:
+        raise InputError.one("--reference-limit", "seconds", reference_limit_s, "needs --with-reference")
     if format not in ([None] if form else formats.FORMATS):
         a_format = f"one of {', '.join(formats.FORMATS)}; none with --form"
         allowed = (
@@ -105,7 +110,7 @@ def export(
     if form is not None and out.suffix == ".parquet":
         return _write_test_set(str(scene), out, form, console_of(reporter))
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
-    read = read_scene(str(scene))
+    read = load_scene(scene)
     refuse_unwritable(out, read.sources)
     if format is not None:
         problem = opened(read, chosen_form(read, FORMS, None).form)
@@ -114,7 +119,7 @@ def export(
             formats.FORMATS[format].write(new, data)
         content = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
     elif form is not None:
-        arrays, about = _program(str(scene), read, form, with_reference, reference_limit_s)
+        arrays, about = _program(read, form, with_reference, reference_limit_s)
         with atomic_output(out, read.sources) as new:
             WRITERS.get(out.suffix, _write_mtx)(new, arrays, about)
         content = f"{form} form, {len(arrays['q'])} unknowns, {counted(about['m'], 'contact')}"
@@ -140,14 +145,12 @@ def matrices(data: Prepared, load: LoadCase) -> formats.Data:
     return arrays if nodes is None else arrays | {"nodes": np.array(nodes)}
 
 
-def _program(
-    source: str, scene: Scene, form: Form, with_reference: bool, limit_s: float | None
-) -> tuple[Arrays, Arrays]:
+def _program(scene: Scene, form: Form, with_reference: bool, limit_s: float | None) -> tuple[Arrays, Arrays]:
     """The arrays of the quadratic program by name, and its facts. Raises InputError, also if a dense form
     does not fit into the memory of this machine.
     """
     chosen_form(scene, FORMS, form)
-    judged = measurable(source, limit_s=limit_s, form=form) if with_reference else opened(scene, form)
+    judged = measurable(scene, limit_s=limit_s, form=form) if with_reference else opened(scene, form)
     problem = in_form(judged.prepared, form)
     (load,) = problem.loads([judged.load])
     blocks = problem.blocks
@@ -218,7 +221,7 @@ def _write_test_set(suite: str, out: Path, form: Form, console: Console) -> Path
     rows: list[Arrays] = []
     for scene in map(read_scene, read_suite(suite).scenes):
         if not scene.refused:
-            arrays, _ = _program("", scene, form, False, None)
+            arrays, _ = _program(scene, form, False, None)
             dense = (M.toarray() if sp.issparse(M) else M for M in arrays.values())
             line = dict(zip(arrays, map(np.ravel, dense), strict=True))
             rows.append(dict.fromkeys(TEST_SET) | line | {"name": scene.name})

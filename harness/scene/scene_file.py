@@ -9,10 +9,12 @@ from typing import Any
 import tomlkit
 
 from problems.errors import InputError
+from problems.input.bounded_types import resolved
 from problems.input.text_files import read_text
 from problems.load_cases.random_gaps import RandomGaps
+from problems.model.scene import Scene
 from problems.random_scenes import drawn_table
-from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_toml
+from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_scene, read_toml
 
 MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes", "stress", "stress_points")  # may be relative paths
@@ -50,8 +52,30 @@ def edited(
     for inner in _tables(document):
         for key in FILES:
             if isinstance(value := inner.get(key), str) and (home / value).is_file():
-                inner[key] = Path(os.path.relpath(home / value, folder)).as_posix()
+                inner[key] = relative(home / value, folder)
     return tomlkit.dumps(document)
+
+
+def relative(file: Path, folder: Path) -> str:
+    """The path by which a scene in `folder` names a file, also where a link leads to either folder."""
+    return Path(os.path.relpath(resolved(file.parent) / file.name, resolved(folder))).as_posix()
+
+
+def file_of(source: object, scene: Scene) -> str:
+    """The file of a scene, or its name. source : what the scene was loaded from.
+
+    Raises InputError if that is a scene that has changed since it was read from the file.
+    """
+    file = str(scene.sources[0]) if scene.sources else scene.name
+    has_file = scene.sources or drawn_table(file)
+    if source is scene and has_file and _content(read_scene(file)) != _content(scene):
+        allowed = "the scene as it is now: what is written starts from the text of its file"
+        raise InputError.one(f"scene {scene.name}", "file", file, allowed)
+    return file
+
+
+def _content(scene: Scene) -> tuple[object, ...]:
+    return scene.key, getattr(scene, "random", ())
 
 
 def with_fasteners(

@@ -23,6 +23,8 @@ from .answer_record import arrays_of, is_of_plates, recorded, summary
 from .solution import solve
 from .validate import print_unusual
 
+TOLERANCE = 1e-9  # of a named solver, by default
+
 
 def solve_into(
     source: str,
@@ -45,6 +47,8 @@ def solve_into(
     started = time.perf_counter()
     if not 0 < tolerance < inf:
         raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
+    if solver is None and tolerance != TOLERANCE:
+        raise InputError.one("--tolerance", "tolerance", tolerance, "needs --solver NAME")
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
     refuse_unwritable(out, scene.sources)

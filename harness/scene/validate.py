@@ -1,7 +1,5 @@
 """Checks a scene without solving it: its parts and effects, its size and memory, the digits of a given K."""
 
-from pathlib import Path
-
 import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
@@ -26,17 +24,18 @@ from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import stage_scenes
 from problems.reporter import SILENT, Reporter
-from problems.scene_files import read_scene
 from report.document.numbers import counted
 
+from .solution import Source, load_scene
 
-def validate(scene: str | Path, *, reporter: Reporter = SILENT) -> Size | None:
+
+def validate(scene: Source, *, reporter: Reporter = SILENT) -> Size | None:
     """Check a scene without solving it.
 
     Parameters
     ----------
-    scene : str or Path
-        Name of a scene, or the path of its file.
+    scene : Scene, str, Path or dict
+        The scene, its name, the path of its file, or the content of its file.
     reporter : Reporter, optional
         With the console of a ConsoleReporter, what would be built is shown; silent by default.
 
@@ -57,7 +56,7 @@ def validate(scene: str | Path, *, reporter: Reporter = SILENT) -> Size | None:
     >>> size.n, size.m
     (1107, 738)
     """
-    read, console = read_scene(str(scene)), console_of(reporter)
+    read, console = load_scene(scene), console_of(reporter)
     size = size_of(read)
     if read.output.stress:
         from .stress import refuse_unusable  # only what a scene calls for

@@ -13,7 +13,7 @@ from problems.forms import Form
 from problems.input.tables import AS_NAMED, TableOptions
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
-from problems.load_cases.random_gaps import random_gaps
+from problems.load_cases.random_gaps import number_faults, random_gaps
 from problems.load_cases.random_inputs import random_inputs
 from problems.load_cases.scan_modes import VARIANCE, scan_modes
 from problems.model.scene import JointScene, Scene
@@ -41,9 +41,9 @@ class GapCases:
         Seed of the random gaps; by default 0.
     mean, sd, correlation_length : float, optional
         Mean, standard deviation and correlation length of the random gaps, mm; by default the scene's.
-    around : Path, optional
+    around : str or Path, optional
         A scan, CSV with columns x, y and gap in mm, that the random gaps pass through.
-    gaps : Path, optional
+    gaps : str or Path, optional
         Measured gaps in place of random ones: .csv, .npz or .npy, one row per case, one column per contact,
         mm.
     options : TableOptions, optional
@@ -53,7 +53,7 @@ class GapCases:
         beside those of its table [random]; in a series also of K, as "ribs.I=8 of normal(2000, 100)".
     contributors : int, optional
         Number N of base points, a power of 2: the cases are the N (d + 2) that show what d inputs contribute.
-    scans : str, optional
+    scans : str or Path, optional
         The files of scans of many joints, as ``scans/*.csv``: the gaps vary about their mean by their
         principal modes.
     variance : float, optional
@@ -71,33 +71,36 @@ class GapCases:
     mean: float | None = None
     sd: float | None = None
     correlation_length: float | None = None
-    around: Path | None = None
-    gaps: Path | None = None
+    around: str | Path | None = None
+    gaps: str | Path | None = None
     options: TableOptions = AS_NAMED
     random: tuple[str, ...] = ()
     contributors: int | None = None
-    scans: str | None = None
+    scans: str | Path | None = None
     variance: float | None = None
 
     @property
     def files(self) -> list[str | Path]:
         """The files that the cases are read from."""
-        return [*filter(None, (self.around, self.gaps)), *glob(self.scans or "")]
+        return [*(file for file in (self.around, self.gaps) if file), *glob(str(self.scans or ""))]
 
-    def faults(self, sweep: Sequence[str] = (), table: str | None = None) -> list[Fault]:
-        """A fault if the cases come from more than one source, or no table has headings. table : another that
-        is read by the options.
+    def faults(self, sweep: Sequence[str] = (), table: bool = False) -> list[Fault]:
+        """A fault for each number out of range, if the cases come from more than one source, or if options of
+        tables have none. table : whether another table is read by them.
         """
         names = (*("seed",)[bool(self.scans) :], "mean", "sd", "correlation_length", "around")
         random = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
         random += ["--random"] * bool(self.random)
         files = ["--scans"] * bool(self.scans), ["--gaps"] * bool(self.gaps)
-        sources, faults = (*files, ["--sweep"] * bool(sweep), random), []
+        sources, faults = (*files, ["--sweep"] * bool(sweep), random), number_faults(self.count, self.seed)
         if self.variance is not None and not (self.scans and 0 < self.variance <= 1):
             faults.append(Fault("--variance", "share", self.variance, "above 0, at most 1, with --scans"))
         if self.options.columns and not (self.around or self.scans or table):
             allowed = "those of --around and --scans; the columns of --gaps are the contacts, in their order"
             faults.append(Fault("--columns", "headings", ", ".join(self.options.columns), allowed))
+        if self.options.missing and not (self.around or self.scans or self.gaps or table):
+            marks = ", ".join(map(str, self.options.missing))
+            faults.append(Fault("--missing", "marks", marks, "those of --around, --scans or --gaps"))
         if self.contributors is not None and (self.count is not None or not self.random):
             allowed = "--random, or [random] in the scene, and no --cases: there are N (inputs + 2)"
             faults.append(Fault("--contributors", "base points", self.contributors, allowed))
@@ -146,10 +149,10 @@ class GapCases:
         if drawn:
             refuse_staged_gaps(scene)
         if self.gaps:
-            return measured_gaps(last, self.gaps, self.count, form, self.options)
+            return measured_gaps(last, Path(self.gaps), self.count, form, self.options)
         if self.scans:
             draw = count, seed, self.variance or VARIANCE
-            return scan_modes(last, self.scans, *draw, form, self.options)
+            return scan_modes(last, str(self.scans), *draw, form, self.options)
         gaps = random_gaps(last, count, seed, *law, form, self.around, self.options) if drawn else None
         if gaps and not random:
             return gaps

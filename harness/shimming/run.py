@@ -1,5 +1,6 @@
 """Searches for shims and writes them: as a scene, a table and a drawing, and as a report."""
 
+import tomllib
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from math import inf
@@ -9,7 +10,7 @@ from typing import Any
 import tomlkit
 
 from harness.measurement.scheduler import workers
-from harness.placement.answer_journal import AnswerJournal
+from harness.placement.answer_journal import AnswerJournal, recorded_form
 from harness.placement.candidates import Plan
 from harness.placement.fresh_cases import ALPHA, Cases, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
@@ -17,8 +18,9 @@ from harness.placement.session import PlanSession
 from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
-from harness.results.provenance import fingerprints, installed_version, stamp
-from harness.scene.scene_file import edited
+from harness.results.provenance import fingerprints, stamp
+from harness.scene.scene_file import edited, file_of
+from harness.scene.solution import Source, load_scene
 from harness.scene.stress import refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.staged import last_scene
@@ -26,13 +28,14 @@ from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
+from problems.forms import Form
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_inputs import RandomInputs
 from problems.model.effect import SpringEffect
 from problems.model.positions import Positions
 from problems.model.scene import JointScene
 from problems.reporter import SILENT, Reporter
-from problems.scene_files import read_scene
+from problems.scene_files import scene_of
 from problems.storage import digest
 
 from .each import each_joint
@@ -43,6 +46,7 @@ from .search import ShimSearch
 from .study import ShimStudy
 
 RECORD = "shim.json"
+FORMS: tuple[Form, ...] = ("dual", "sparse")
 MOST = 1e9  # of a limit: larger ones are none
 MESH = "Mesh error: not part of it; the report of a single joint has it"
 REPORT = ("report.md", "index.html", "sheet.pdf", "shims.csv", "shims.png", "forces.csv")
@@ -74,7 +78,7 @@ class Shimming:
 
 @keeps_threads
 def shim(
-    scene: str | Path,
+    scene: Source,
     out: str | Path,
     *,
     allow_gap_mm: float,
@@ -93,8 +97,8 @@ def shim(
 
     Parameters
     ----------
-    scene : str or Path
-        Name of a scene, or the path of its file, with fasteners.
+    scene : Scene, str or Path
+        A scene that was read, its name, or the path of its file, with fasteners.
     out : str or Path
         Directory for what is written, and the answers so far: the same call continues an interrupted search.
     allow_gap_mm : float
@@ -138,9 +142,9 @@ def shim(
     >>> found.passed
     True
     """
-    source, directory, read = str(scene), Path(out), read_scene(str(scene))
-    inputs = [Path(file) for file in (scene, patches, *cases.files) if file]
-    refuse_inputs([directory / name for name in OUTPUTS], [*read.sources, *inputs])
+    read, directory = load_scene(scene), Path(out)
+    inputs = [*read.sources, *(Path(file) for file in (patches, *cases.files) if file)]
+    refuse_inputs([directory / name for name in OUTPUTS], inputs)
     asked: dict[str, Any] = {
         "limit_mm": allow_gap_mm,
         "allow_force": allow_force,
@@ -168,7 +172,8 @@ def shim(
     if touching:
         raise InputError(touching)
     number = 1 if cases.are_one(read) else cases.count or RANDOM
-    form = chosen_form(read, ("dual", "sparse"), None, number * len(there)).form
+    wanted = recorded_form(directory / records.SHIMS, FORMS)
+    form = chosen_form(read, FORMS, wanted, number * len(there)).form
     made = cases.of_search(read, form)
     if allow_stress is not None and isinstance(made, RandomInputs):
         keys = [one.name for one in made.inputs]
@@ -184,7 +189,7 @@ def shim(
         raise InputError.one("--share", "share", goal.share, allowed)
     order = Cases(range(made.count), made.count) if each else Cases.of(made.count, listed, goal)
     if patches is None:
-        gap = PlanSession(study).gaps(order.numbers[: order.choosing]).max(axis=1)
+        gap = PlanSession(study).largest_gap(order.numbers[: order.choosing])
         there = patches_of_gap(bare.joint, gap, allow_gap_mm) or there
         study = replace(study, patches=there)
     law = other_gaps(bare, made)
@@ -196,22 +201,16 @@ def shim(
                 table.update(one.model_dump(mode="json", exclude_none=True))
                 document.setdefault("effect", tomlkit.aot()).append(table)
 
-        return edited(source, directory, change, (), law)
+        return edited(file_of(scene, read), directory, change, (), law)
 
-    text([])  # refused now rather than after the search
+    without = "" if each else text([])  # refused now rather than after the search
     asked |= {"share": goal.share, "stock": list(thicknesses), "each": each, "taper": taper}
-    identity = asked | {
-        "patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}",
-        "scene_key": read.key,
-        "cases_key": made.content_key,
-        "cases": made.count,
-        "form": form,
-        "rivetbench_version": installed_version("rivetbench"),
-    }
-    records.refuse_other_command(directory, records.SHIMS, OUTPUTS)
+    identity = asked | {"patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}"} | study.identity
     if order.table:
         reporter.say(HELD_BACK)
-    with records.locked(directory, records.SHIMS):
+    with records.locked(directory, records.SHIMS, outputs=OUTPUTS):
+        if not each:
+            scene_of(tomllib.loads(without), str(directory / "shimmed.toml"))  # as is refused at the end
         pool = workers(scheduler, console_of(reporter)) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
             journal = AnswerJournal(study, directory / records.SHIMS, identity, executor)
@@ -227,7 +226,7 @@ def shim(
                 words, passed = sentence_of(result, goal, study)
         from report.writers.shim_report import write  # slow to import: not before the search
 
-        files = fingerprints([*bare.sources, *(file for file in inputs[1:] if file.is_file())])
+        files = fingerprints(file for file in inputs if file.is_file())
         record |= {"scene": bare.name, "title": bare.title, "scene_key": read.key, "inputs": files}
         record |= asked | {"said": words, **stamp()}
         if not each:

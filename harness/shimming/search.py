@@ -87,8 +87,7 @@ class ShimSearch(PlanSearch):
 
     def deciding(self, step: Step) -> tuple[int, ...]:
         """The worst cases of a plan but those that may fail, by their numbers."""
-        worst = sorted(range(self.cases), key=lambda k: (-round(step.outcome.largest[k], DIGITS), k))
-        return tuple(sorted(worst[self.allowed :][:MORE_CASES]))
+        return tuple(sorted(self.worst_first(step)[self.allowed :][:MORE_CASES]))
 
     def once(self, current: Plan, count: int | None = None) -> tuple[list[Step], Step]:
         """All plans kept, and the best; the first one, without shims, if no plan keeps the limit."""
@@ -115,7 +114,7 @@ class ShimSearch(PlanSearch):
         yield ()
         plans = [self.plan(np.full_like(self.sizes(()), t)) for t in self.stock]
         outcomes = self.outcomes(plans, cases, ESTIMATED, ())
-        yield min(zip([self.strict._value(one)[0] for one in outcomes], plans, strict=True))[1]
+        yield min(zip([self.strict.value(one)[0] for one in outcomes], plans, strict=True))[1]
 
     def kept(self, plan: Plan) -> list[Step]:
         """The plan, proven, and what it grows to, until that keeps the limit or cannot grow."""
@@ -143,7 +142,7 @@ class ShimSearch(PlanSearch):
             if not options:
                 break
             made = self.outcomes(options, cases, ESTIMATED, base)
-            values = [(self._value(one), option) for one, option in zip(made, options, strict=True)]
+            values = [(self.value(one), option) for one, option in zip(made, options, strict=True)]
             k = values.index(min(values))
             outcome, plan = made[k], options[k]
             if self.gap(outcome) <= self.limit_mm:
@@ -152,10 +151,6 @@ class ShimSearch(PlanSearch):
             idle = 0 if values[k][0][0] < best[0][0] else idle + 1
             best = min(best, values[k])
         return best[1], False
-
-    def _value(self, outcome: Outcome) -> tuple[float, float]:
-        mean = float(np.mean(outcome.mean))
-        return round(max(self.gap(outcome), self.limit_mm), DIGITS), round(mean, DIGITS)
 
     def _changes(self, plan: Plan, outcome: Outcome) -> list[Plan]:
         """A thickness as large as a gap asks for or a step more, one less, or no shim, in a patch near

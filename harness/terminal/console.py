@@ -134,7 +134,7 @@ def show_verdict(kind: str, sentences: Sequence[str], console: Console) -> int:
     code, style = VERDICTS[kind]
     for sentence in sentences[:-1]:
         console.print(sentence)
-    console.print(sentences[-1], style=style)
+    console.print(sentences[-1], style=style, soft_wrap=True)
     return code
 
 

@@ -130,8 +130,9 @@ def gate(
         raise InputError.one("DIR", "directory", str(folder), "no such directory; `run` makes one")
     sides = [folder] if base is None else [folder, base]
     inputs = [path for side in sides for files in MEASURED for path in side.glob(files)]
-    if max_slowdown is not None and base is None:
-        raise InputError.one("--max-slowdown", "factor", max_slowdown, "needs --baseline DIR")
+    for option, factor, usual in (("--margin", margin, MARGIN), ("--max-slowdown", max_slowdown, None)):
+        if factor != usual and base is None:
+            raise InputError.one(option, "factor", factor, "needs --baseline DIR")
     named = {"--json": json_file, "--junit": junit_file}
     outputs = {option: Path(file) if file else None for option, file in named.items()}
     refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])

@@ -155,18 +155,19 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
 
 
 def measurable(
-    source: str,
+    source: str | Scene,
     reporter: Reporter = SILENT,
     limit_s: float | None = None,
     form: Form = "dual",
 ) -> ReferenceProblem:
-    """Open or build a scene, by name or path, that a solver can be measured on. Raises InputError, also if K
-    is not positive definite.
+    """Open or build a scene, or that of a name or path, that a solver can be measured on. Raises InputError,
+    also if K is not positive definite.
     """
-    problem = opened(read_scene(source), form, reporter, limit_s)
+    scene = read_scene(source) if isinstance(source, str) else source
+    problem = opened(scene, form, reporter, limit_s)
     if problem.prepared.assembly.m == 0:
         allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
-        raise InputError.one(source, "contacts", 0, allowed)
+        raise InputError.one(scene.source_of("A"), "contacts", 0, allowed)
     reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()
     return problem

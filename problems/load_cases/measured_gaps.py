@@ -94,8 +94,10 @@ def measured_gaps(
     if count is not None and count > len(gaps):
         raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
     notes = []
+    if options.missing:
+        gaps = np.where(np.isin(gaps, options.numbers), np.nan, gaps)
     if options.missing and isinstance(scene, JointScene):
-        gaps, lost = _completed(scene.joint, np.where(np.isin(gaps, options.numbers), np.nan, gaps))
+        gaps, lost = _completed(scene.joint, gaps)
         notes = [f"{path}: {lost} missing gaps are taken from the nearest contact of their case"] * bool(lost)
     _refuse_infinite(path, gaps)
     notes += _unusual(scene, path, gaps[:count])

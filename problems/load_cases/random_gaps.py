@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,15 @@ class RandomGaps(LoadCases):
         return Scan.of(self.joint, self.points, self.field.random.correlation_length)
 
 
+def number_faults(cases: int | None, seed: int | None) -> list[Fault]:
+    """A fault for a number of cases below 1, and for a seed below 0."""
+    return [
+        Fault(f"--{name}", name, value, f"a whole number, at least {least}")
+        for name, value, least in (("cases", cases, 1), ("seed", seed, 0))
+        if value is not None and not (isinstance(value, Integral) and value >= least)
+    ]
+
+
 def random_gaps(
     scene: Scene,
     cases: int,
@@ -119,8 +129,8 @@ def random_gaps(
     Raises
     ------
     InputError
-        If the mean, sd or correlation length is given neither here nor in the scene, or the scene has no
-        joint, or more than one `initial_gap`.
+        If a number is out of range, the mean, sd or correlation length is given neither here nor in the
+        scene, or the scene has no joint, or more than one `initial_gap`.
 
     Examples
     --------
@@ -148,9 +158,11 @@ def random_gaps(
         usual = 0.0
     values = {"mean": table.get("mean", usual)} | (table.get("random") or {})
     values |= {key: value for key, value in law.items() if value is not None}
-    if missing := [key for key in law if values.get(key) is None]:
-        allowed = "is not in the scene: give --{}, in mm"
-        raise InputError([Fault(where, key, None, allowed.format(key.replace("_", "-"))) for key in missing])
+    allowed, faults = "is not in the scene: give --{}, in mm", number_faults(cases, seed)
+    missing = [key for key in law if values.get(key) is None]
+    faults += [Fault(where, key, None, allowed.format(key.replace("_", "-"))) for key in missing]
+    if faults:
+        raise InputError(faults)
     random = {"sd": values["sd"], "correlation_length": values["correlation_length"], "seed": 0}
     try:
         field = InitialGap.model_validate(table | {"mean": values["mean"], "random": random})

@@ -14,6 +14,7 @@ import harness
 import rivetbench
 from harness import (
     Answer,
+    GapCases,
     InputError,
     LoadCase,
     Solver,
@@ -61,6 +62,40 @@ def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> N
     scenes.append(load_scene({"joint": Joint.model_validate(table["joint"]), "effect": effects}))
     assert len({scene.key for scene in scenes}) == 1
     assert load_scene(scenes[0]) is scenes[0]
+
+
+@pytest.mark.usefixtures("without_report")
+def test_every_function_takes_a_scene_as_an_object_or_a_dict(tmp_path: Path) -> None:
+    table = tomllib.loads(STRIP)
+    sources = [str(write_strip(tmp_path)), load_scene(table), table]
+    assert len({harness.validate(source) for source in sources}) == 1
+    written = [
+        harness.export(source, tmp_path / f"{n}.npz", format="npz") for n, source in enumerate(sources)
+    ]
+    assert len({load_scene(path).key for path in written}) == 1
+    sweep: Any = {"sweep": ["initial_gap.mean=0.4,0.5"], "options": harness.SeriesOptions(check=0)}
+    done = [harness.run_series(source, tmp_path / f"{n}", **sweep) for n, source in enumerate(sources)]
+    assert len({tuple(row["max_gap_mm"] for row in one.rows) for one in done}) == 1
+    for source in sources:
+        with pytest.raises(InputError, match=r"KEY one of initial_gap\.mean"):
+            harness.tolerance(source, tmp_path / "none", "nothing=1:2", 0.1)
+
+
+def test_load_cases_have_paths_or_texts_and_possible_numbers(tmp_path: Path) -> None:
+    scene = load_scene(write_strip(tmp_path))
+    np.savetxt(tmp_path / "table.csv", np.full((3, 45), 0.2), delimiter=",")
+    for k in range(2):
+        (tmp_path / f"scan{k}.csv").write_text(f"x,y,gap\n0,0,0.{k + 1}\n400,0,0.2\n0,120,0.2\n400,120,0.3\n")
+    for name, path in (("gaps", "table.csv"), ("around", "scan0.csv"), ("scans", "scan*.csv")):
+        pair = [GapCases(count=2, **{name: kind(tmp_path / path)}) for kind in (str, Path)]  # type: ignore[arg-type]
+        assert len({tuple(map(str, cases.files)) for cases in pair}) == 1
+        text, path_of = (cases.of(scene, "dual").load(1).g for cases in pair)
+        np.testing.assert_array_equal(text, path_of)
+    for wrong in (GapCases(count=0, seed=-1), GapCases(count=2.5, seed=0.5)):  # type: ignore[arg-type]
+        with pytest.raises(InputError) as caught:
+            harness.run_series(scene, tmp_path / "none", wrong)
+        assert [fault.where for fault in caught.value.faults] == ["--cases", "--seed"]
+    assert not GapCases(count=np.int64(2), seed=np.int64(0)).faults()  # type: ignore[arg-type]
 
 
 def test_all_faults_of_a_dict_are_named() -> None:

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from queue import Queue
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -268,6 +270,25 @@ def test_a_saved_scene_finds_its_files(tmp_path: Path) -> None:
     assert Settings.of(scene_of(there / "scene.toml")).preload == 77.0
 
 
+def test_a_scene_written_through_links_finds_its_files(tmp_path: Path) -> None:
+    """From a linked folder to another, as on clusters; a file that is a link itself keeps its name."""
+    home, far = tmp_path / "a" / "home", tmp_path / "b" / "c" / "far"
+    home.mkdir(parents=True)
+    far.mkdir(parents=True)
+    (tmp_path / "joint").symlink_to(home)
+    (tmp_path / "results").symlink_to(far)
+    (tmp_path / "store").write_text("x,y,gap\n0,0,0.1\n100,50,0.2\n0,50,0.1\n100,0,0.1\n")
+    (home.parent / "gap.csv").symlink_to(tmp_path / "store")
+    scene = home / "scene.toml"
+    scene.write_text(
+        two_parts() + '[[effect]]\nkind = "measured_gap"\nfile = "../gap.csv"\n' + FASTENERS, "utf-8"
+    )
+    text = edited(str(tmp_path / "joint/scene.toml"), tmp_path / "results", lambda _: None, CHANGED)
+    (far / "scene.toml").write_text(text, "utf-8")
+    assert '"../../../a/gap.csv"' in text
+    assert scene_of(tmp_path / "results/scene.toml").key == scene_of(scene).key
+
+
 @pytest.mark.parametrize(
     ("scene", "said"),
     [("hard/duplicates/2e-05", "own matrices"), ("gallery/heavy-sheet-on-tool", "no fasteners")],
@@ -276,6 +297,20 @@ def test_scenes_without_fasteners(scene: str, said: str) -> None:
     done = harness("explore", scene, "--no-open")
     assert done.exit_code == 2
     assert said in done.output
+
+
+def test_a_browser_in_the_terminal_gets_the_page(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which `webbrowser.open` waits for: the page is served meanwhile."""
+    served, asked = Event(), Queue[tuple[str, bool]]()
+
+    def serve(*of: Any) -> None:
+        of[-1]("http://localhost")
+        served.set()
+
+    monkeypatch.setattr(explore_page, "serve", serve)
+    monkeypatch.setattr("webbrowser.open", lambda address: asked.put((address, served.wait(5))))
+    assert harness("explore", path).exit_code == 0
+    assert asked.get(timeout=10) == ("http://localhost", True)
 
 
 def test_the_outcome_in_words(path: Path) -> None:

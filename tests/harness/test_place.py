@@ -3,8 +3,10 @@
 import json
 import re
 import shutil
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -16,18 +18,21 @@ from commands import harness
 from scipy.stats import binom, binomtest
 from small_joints import FASTENERS, GAP, two_parts
 
-from harness import solve
+from harness import GapCases, shim, solve
+from harness import place as place_fasteners
 from harness.placement import search as search_module
 from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, uniform_plans
 from harness.placement.fresh_cases import Cases, Goal, search_in_rounds
 from harness.placement.search import Search
-from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question
+from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question, answer
+from harness.planning.form_choice import Choice
 from harness.results import series_file
 from harness.results.records import PLANS
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
+from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.reporter import Reporter
 from problems.scene_files import read_scene
@@ -403,9 +408,11 @@ def test_the_command_finds_a_plan_that_solve_confirms(
     assert [step["fasteners"] for step in record["order"]] == [*range(best["fasteners"] + 1)]
     for name in ("report.md", "gap-against-fasteners.png", "before-and-after.png", "order.csv"):
         assert (tmp_path / "out" / "report" / name).is_file()
-    # The same command again finds all answers, and says the same.
+    # The same command again finds all answers, in their form, though another is the cheaper one by now.
     plans = (tmp_path / "out" / PLANS).read_text()
-    assert place(strip, tmp_path / "out", "--allow-gap", 0.05).exit_code == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("harness.planning.form_choice._by_rule", lambda *_: Choice("sparse"))
+        assert place(strip, tmp_path / "out", "--allow-gap", 0.05).exit_code == 0
     assert (tmp_path / "out" / PLANS).read_text() == plans
     # Another search is refused before its work, and leaves the files as they are.
     scene = plan.read_text()
@@ -458,6 +465,28 @@ def test_an_interrupted_search_goes_on(
     assert records_of(whole[0]) == records_of(tmp_path / "parts")
 
 
+def test_workers_get_the_rows_of_their_question(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And give the outcomes of the whole table."""
+    movable, sent = MovableFasteners.of(read_scene(str(strip))), list[np.ndarray]()
+    law = random_gaps(movable.bare, 6, 0)
+    gaps = np.array([law.load(k).g for k in range(6)])
+    study = FastenerStudy(movable.bare, MeasuredGaps(law.load(0), gaps, 6), "dual", movable)
+    questions = [Question((((33.0, 12.5),),), cases) for cases in ((0, 1), (4,))]
+
+    def on_worker(task: Any) -> list[Outcome]:
+        sent.append(task[0].cases.gaps)
+        return answer(task)
+
+    monkeypatch.setattr("harness.placement.answer_journal.answer", on_worker)
+    with ThreadPoolExecutor(1) as pool:
+        outcomes = AnswerJournal(study, tmp_path / PLANS, {}, (pool, 1))(questions)
+    assert outcomes == [PlanSession(study).answer(question) for question in questions]
+    for rows, question in zip(sent, questions, strict=True):
+        np.testing.assert_array_equal(rows, gaps[list(question.cases)])
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_report", "without_pictures")
 def test_workers_find_the_same(strip: Path, tmp_path: Path, whole: tuple[Path, str], cluster: Any) -> None:
@@ -468,7 +497,10 @@ def test_workers_find_the_same(strip: Path, tmp_path: Path, whole: tuple[Path, s
 
 
 def records_of(directory: Path) -> dict[str, Any]:
-    return dict(json.loads((directory / "place.json").read_text()))
+    record = dict(json.loads((directory / "place.json").read_text()))
+    assert record.pop("recorded_at")
+    assert record["machine"]
+    return record
 
 
 @pytest.mark.slow
@@ -501,6 +533,10 @@ def test_a_share_needs_cases_to_show_it() -> None:
         (("--candidates", "4x", "--count", 1), ["holes = '4x'", "or a CSV file"]),
         (("--candidates", "2by4", "--count", 1), ["2by4", "readable"]),
         (("--count", 1, "--gaps", "g.csv", "--seed", 1), ["random gaps or --gaps"]),
+        (
+            ("--count", 1, "--candidates", "1x3", "--columns", "X,Y", "--missing", 9),
+            ["--columns: headings = 'X, Y'", "--missing: marks = '9'"],
+        ),
         (("--count", 1, "--cases", 10), ["--share", "take 59"]),
         (("--allow-gap", "inf"), ["finite"]),
     ],
@@ -551,6 +587,36 @@ def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) ->
     done = harness("series", strip, "--cases", 2, "--out", tmp_path / "other")
     assert done.exit_code == 2
     assert f"has {PLANS} of another command: name another directory" in done.output
+
+
+class ReachedError(Exception):
+    """A search begins."""
+
+
+def test_a_scene_that_was_read_needs_its_file(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The search begins from a scene as from its path; not without a file, or with another content of it."""
+
+    def search(*_: object) -> None:
+        raise ReachedError
+
+    for module in ("placement", "shimming"):
+        monkeypatch.setattr(f"harness.{module}.run.search_in_rounds", search)
+    read, table = read_scene(str(strip)), tomllib.loads(strip.read_text())
+    gap, *rest = read.effects  # type: ignore[attr-defined]
+    changed = replace(read, effects=(gap.model_copy(update={"mean": 0.06}), *rest))  # type: ignore[call-arg]
+    asked: Any = {"cases": GapCases(count=2), "share": 1.0}
+    for n, call in enumerate(
+        (partial(place_fasteners, count=1, **asked), partial(shim, allow_gap_mm=0.1, stock="0.1", **asked))
+    ):
+        with pytest.raises(ReachedError):
+            call(read, tmp_path / f"{n}")
+        with pytest.raises(InputError, match="a scene in a file"):
+            call(table, tmp_path / "none")
+        with pytest.raises(InputError, match=r"strip\.toml'?: the scene as it is now"):
+            call(changed, tmp_path / "none")
+    assert not (tmp_path / "none").exists()
 
 
 def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:

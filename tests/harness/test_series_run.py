@@ -260,6 +260,10 @@ def test_what_cannot_be_together_is_said_at_once() -> None:
     assert "--variance: share = 2" in ended.output
     ended = series("--gaps", "gaps.csv", "--columns", "X,Y,Gap", "--out", "none", code=2)
     assert "--columns: headings = 'X, Y, Gap'" in ended.output
+    ended = series("--missing", "9999", "--memory-limit", "500", "--time-limit", "1", "--out", "none", code=2)
+    assert "--missing: marks = '9999'" in ended.output
+    assert "--time-limit: limit = 1.0: with --plugin" in ended.output
+    assert "--memory-limit: limit = 500: with --plugin" in ended.output
 
 
 def results_of(count: int, check: int, **solver: Any) -> list[Result]:

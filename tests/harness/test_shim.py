@@ -20,6 +20,7 @@ from harness import solve
 from harness.placement.answer_journal import AnswerJournal
 from harness.placement.fresh_cases import Goal
 from harness.placement.session import Outcome, PlanSession, Question
+from harness.planning.form_choice import Choice
 from harness.series.load_case_source import GapCases
 from harness.shimming.each import each_joint
 from harness.shimming.gap_regions import patches_of_gap
@@ -178,6 +179,30 @@ def test_patches_of_a_gap_need_shims_that_change_nothing_else(strip: Path) -> No
     assert patches_of_gap(joint, answer.gap, answer.gap.max()) == ()
 
 
+def test_what_could_not_be_read_is_refused_before_the_search(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("harness.shimming.run.edited", lambda *_: "joint = 1\n")
+    done = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1)
+    assert done.exit_code == 2
+    assert "shimmed.toml: joint = 1" in done.output
+    assert not (tmp_path / "out" / "shims.jsonl").exists()
+
+
+def test_the_gap_that_patches_follow_is_found_in_blocks(strip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of no more cases than memory has room for; the largest of all, as if they were solved at once."""
+    session, sizes = session_of(strip, "4x1"), list[int]()
+    session.cases = random_gaps(session.study.bare, 5, 0)
+    at_once = session.answers([()], range(5), 1e-9)[-1].vectors[1].max(axis=1)
+    together = session.last.sweeps.together
+    monkeypatch.setattr(
+        session.last.sweeps, "together", lambda loads, *how: sizes.append(len(loads)) or together(loads, *how)
+    )
+    session.block = 2
+    np.testing.assert_allclose(session.largest_gap(range(5)), at_once, rtol=0, atol=1e-4)
+    assert sizes == [2, 2, 1]
+
+
 def test_a_region_is_divided_where_its_parts_differ_least(strip: Path) -> None:
     """By hand: the zone without a gap first; of two cuts with the same largest difference, the least sum."""
     joint = read_scene(str(strip)).joint  # type: ignore[attr-defined]
@@ -280,7 +305,9 @@ def test_stocks_are_lists_or_steps() -> None:
             stock_of(text)
 
 
-def test_the_command_finds_shims_that_solve_confirms(strip: Path, tmp_path: Path) -> None:
+def test_the_command_finds_shims_that_solve_confirms(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     done = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1)
     assert done.exit_code == 0, done.output
     record, table = record_of(tmp_path / "out"), pd.read_csv(tmp_path / "out" / "shims.csv")
@@ -300,9 +327,11 @@ def test_the_command_finds_shims_that_solve_confirms(strip: Path, tmp_path: Path
     assert "data:image/png;base64," in page
     assert record["inputs"]["strip.toml"] == sha256(strip.read_bytes()).hexdigest()
     assert record["scene_key"] == read_scene(str(strip)).key
-    # The same command again finds all answers; another search is refused.
+    # The same command again finds all answers, in their form, though another is the cheaper one by now.
     answers = (tmp_path / "out" / "shims.jsonl").read_text()
-    assert shim(strip, tmp_path / "out", "--cases", 2, "--share", 1).exit_code == 0
+    with monkeypatch.context() as patch:
+        patch.setattr("harness.planning.form_choice._by_rule", lambda *_: Choice("sparse"))
+        assert shim(strip, tmp_path / "out", "--cases", 2, "--share", 1).exit_code == 0
     assert (tmp_path / "out" / "shims.jsonl").read_text() == answers
     other = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1, "--allow-force", 500)
     assert other.exit_code == 2
@@ -353,6 +382,7 @@ def test_solve_says_the_same_of_one_joint(
         ),
         (("--patches", "outlines.csv"), ["line 2, outline", "two of its edges cross", "a name of its own"]),
         (("--allow-gap", -1), ["limit_mm", "above 0"]),
+        (("--patches", "patches.csv", "--missing", 9999), ["--missing: marks = '9999'"]),
         (("--share", 2), ["share", "at most 1"]),
         (("--cases", 10), ["--share", "take 59"]),
     ],

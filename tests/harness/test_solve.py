@@ -69,7 +69,7 @@ def run(folder: Path, text: str = SCENE, solver: str | None = None, preload: flo
     """Solve, and return what solution.json says with the exit code and the terminal's text."""
     path = folder / "scene.toml"
     path.write_text(text.replace("PRELOAD", str(preload)))
-    code, shown = said_by(partial(solve_into, str(path), solver, 1e-10, folder / "out"))
+    code, shown = said_by(partial(solve_into, str(path), solver, 1e-10 if solver else 1e-9, folder / "out"))
     record = json.loads((folder / "out" / "solution.json").read_text())
     return record | {"code": code, "shown": shown}
 

@@ -63,6 +63,17 @@ def test_a_part_may_have_any_name(name: str, tmp_path: Path) -> None:
     assert harness("init", tmp_path / "two\nlines.toml").exit_code == 2
 
 
+def test_the_starter_names_files_through_links(tmp_path: Path) -> None:
+    (tmp_path / "far" / "away").mkdir(parents=True)
+    (tmp_path / "here").symlink_to(tmp_path / "far" / "away")
+    (tmp_path / "wing.npz").touch()
+    done = harness("init", "--superelements", tmp_path / "wing.npz", tmp_path / "here/scene.toml")
+    assert done.exit_code == 0, done.output
+    (part,) = tomllib.loads((tmp_path / "here/scene.toml").read_text("utf-8"))["joint"]["part"]
+    assert (part["superelement"], part["nodes"]) == ("../../wing.npz", "../../wing.csv")
+    assert (tmp_path / "here" / part["superelement"]).is_file()
+
+
 def test_validate_says_what_there_is(folder: Path) -> None:
     done = harness("validate", folder / "edited.toml")
     assert done.exit_code == 0, done.output

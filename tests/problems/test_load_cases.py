@@ -11,6 +11,7 @@ from strip_scene import write_strip
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.prepared import Prepared
+from problems.input.tables import TableOptions
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
@@ -111,6 +112,18 @@ def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
     case = measured_gaps(own_scene, table).load(1)
     np.testing.assert_array_equal(case.g, np.full(10, 0.25))
     np.testing.assert_array_equal(case.f, np.load(tmp_path / "own.npz", data)["f"])
+
+
+def test_a_mark_of_own_matrices_is_no_gap(tmp_path: Path) -> None:
+    """Without places no other gap takes its place."""
+    import tiny_joint
+
+    own_scene = read_scene(str(tiny_joint.write_problem(tmp_path / "own.npz")))
+    gaps = np.full((2, 10), 0.25)
+    gaps[1, 3] = 9999
+    np.save(tmp_path / "gaps.npy", gaps)
+    with pytest.raises(InputError, match="case 1, contact 3 = nan"):
+        measured_gaps(own_scene, tmp_path / "gaps.npy", options=TableOptions(missing=(9999,)))
 
 
 @pytest.mark.parametrize("kind", ["csv", "npz", "npy"])

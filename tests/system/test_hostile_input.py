@@ -83,6 +83,25 @@ def test_numbers_of_the_command_line_are_bounded(words: str, said: str, tmp_path
 
 
 @pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("solve SCENE --tolerance 1e-6", "--tolerance: tolerance = 1e-06: needs --solver"),
+        ("export SCENE --form dual --reference-limit 5", "--reference-limit: seconds = 5.0: needs"),
+        ("gate DIR --margin 2", "--margin: factor = 2.0: needs --baseline"),
+    ],
+)
+def test_an_option_without_effect_is_refused(words: str, said: str, tmp_path: Path) -> None:
+    """As what it is for is not asked."""
+    command, *others = words.split()
+    places: dict[str, object] = {"SCENE": scene_file(tmp_path), "DIR": tmp_path}
+    out = () if command == "gate" else ("--out", tmp_path / "out")
+    done = harness(command, *(places.get(word, word) for word in others), *out)
+    assert done.exit_code == 2
+    assert said in done.output
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
     "command", ["series SCENE --out OUT", "run gate --solver newton --out OUT", "check --solver newton"]
 )
 def test_a_plug_in_that_is_not_asked_for_is_refused(command: str, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from small_problems import make_load, make_prepared
 
 import harness
 from harness import LoadCase
+from problems.effects.fasteners import Fasteners
 from problems.forms.prepared import Prepared
 from problems.model.scene import Scene
 from solvers.methods.gi import GoldfarbIdnani
@@ -32,11 +34,19 @@ def problem(k: int) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
 
 OWN = [harness.own_matrices(*problem(k)[2]) for k in range(THREADS)]
 JOINT = harness.load_scene("gallery/three-part-stack")  # one object for all threads
+FASTENERS = Fasteners(kind="fasteners", preload=300.0, points=((100.0, 60.0), (250.0, 40.0)))
+FASTENED = replace(JOINT, effects=(*JOINT.effects, FASTENERS))  # type: ignore[attr-defined, call-arg]
 LAW = {"mean": 0.1, "sd": 0.05, "correlation_length": 300.0}
 
 
 def series(scene: Scene, cases: Any) -> list[Any]:
     return [result.gap for result in harness.solve_series(scene, cases)]
+
+
+def explored(k: int) -> list[Any]:
+    explorer = harness.Explorer(FASTENED, "dual")
+    answer = explorer.answer(replace(explorer.settings, preload=300.0 + 100.0 * k))
+    return [answer.lam, answer.gap, explorer.proven(answer).gap]
 
 
 def cases(k: int) -> list[LoadCase]:
@@ -54,6 +64,7 @@ CALLS: dict[str, Callable[[int], Any]] = {
     "solve_dual": lambda k: harness.solve_dual(problem(k)[0].Q, problem(k)[1].p, ("newton", "gi")[k % 2]).lam,
     "solve_series": lambda k: series(OWN[k], cases(k)),
     "solve_series of random gaps": lambda k: series(JOINT, harness.random_gaps(JOINT, 3, k, **LAW)),
+    "Explorer": explored,
     "random_gaps": lambda k: harness.random_gaps(JOINT, 2, k, **LAW).load(1).g,
     "check_solver": lambda k: list(map(str, harness.check_solver(GoldfarbIdnani, ("dual",)))),
 }
