@@ -54,9 +54,8 @@ def run(
     solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite) if key is None else of_key(expand(suite), key)
     text, written = to_toml(suite), directory / "suite.toml"
-    other = (
-        written.is_file() and written.read_bytes() != text.encode()
-    )  # this command, interrupted, left the same
+    # This command, interrupted before its first row, has left the same.
+    other = written.is_file() and written.read_bytes() != text.encode()
     folders, outputs = ("answers", "scenes", "logs"), ("report", *["suite.toml"] * other)
     with records.locked(directory, folders=folders, outputs=outputs):
         rows = resumed(directory, plan, solvers, console)
