@@ -68,13 +68,24 @@ def wait_for(condition: Any) -> Any:
     return found
 
 
+def is_alive(process: psutil.Process) -> bool:
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
 def processes(cache: Path) -> list[psutil.Process]:
-    """Those that were started with this cache, which marks a test's own."""
-    living = []
+    """Those that were started with this cache, which marks a test's own, and forks of this process, which no
+    variable marks; a fork whose parent has ended is not among them.
+    """
+    living, here = [], psutil.Process()
+    descendants = here.children(recursive=True)
     for process in psutil.process_iter():
         try:
-            ours = process.environ().get("RIVETBENCH_CACHE") == str(cache)
-            if ours and process.status() != psutil.STATUS_ZOMBIE:
+            fork = process in descendants and process.cmdline() == here.cmdline()
+            ours = fork or process.environ().get("RIVETBENCH_CACHE") == str(cache)
+            if ours and is_alive(process):
                 living.append(process)
         except psutil.Error:
             continue
