@@ -1,6 +1,5 @@
 """Runs of a suite: what they say, their rows, answers that were moved, and the processes that they leave."""
 
-import signal
 import time
 from io import StringIO
 from pathlib import Path
@@ -52,11 +51,6 @@ def series_rows(directory: Path) -> list[Row]:
         return list(series_file.rows(directory))
     except InputError:
         return []
-
-
-def heed_interrupts() -> None:
-    """As in a terminal: a shell starts what it puts in the background with SIGINT ignored."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def wait_for(condition: Any) -> Any:

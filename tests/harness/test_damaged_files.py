@@ -110,30 +110,30 @@ def test_a_file_that_holds_no_series_is_named(damage: Any, series: Path) -> None
         assert solve_series(series).exit_code == 2
 
 
-#: By what they damage; the series goes on, or refuses to, after the first of each.
-STATEMENTS = {
-    "UPDATE facts SET value = {} WHERE name = 'series'": (
-        *("'[]'", """'{"identity": 1}'""", "1", "CAST(x'ff' AS TEXT)"),
-    ),
-    "UPDATE facts SET value = {} WHERE name = 'contacts'": (
-        *("1", "'a'", "x''", "x'00'", "substr(value, 1, 200)"),
-    ),
-    "UPDATE cases SET gap = {} WHERE number = 3": ("NULL", "substr(gap, 5)", "printf('%180s', 'a')"),
-    "UPDATE cases SET row = {} WHERE number = 3": (
-        *("'[]'", "'1'", """'{"case": 3}'""", "x'ff'", "CAST(x'ff' AS TEXT)"),
-    ),
-    "DELETE FROM facts WHERE name = '{}'": ("series", "contacts"),
-    "DROP TABLE {}": ("cases",),
-}
-
-
 @pytest.mark.parametrize(
-    ("statement", "goes_on"),
-    [(text.format(value), k == 0) for text, values in STATEMENTS.items() for k, value in enumerate(values)],
+    "statement",
+    [
+        *(
+            f"UPDATE facts SET value = {value} WHERE name = 'series'"
+            for value in ("'[]'", """'{"identity": 1}'""", "1", "CAST(x'ff' AS TEXT)")
+        ),
+        *(
+            f"UPDATE facts SET value = {value} WHERE name = 'contacts'"
+            for value in ("1", "'a'", "x''", "x'00'", "substr(value, 1, 200)")
+        ),
+        "DELETE FROM facts WHERE name = 'series'",
+        "DELETE FROM facts WHERE name = 'contacts'",
+        "UPDATE cases SET gap = NULL WHERE number = 3",
+        "UPDATE cases SET gap = substr(gap, 5) WHERE number = 3",
+        "UPDATE cases SET gap = printf('%180s', 'a') WHERE number = 3",
+        *(
+            f"UPDATE cases SET row = {row} WHERE number = 3"
+            for row in ("'[]'", "'1'", """'{"case": 3}'""", "x'ff'", "CAST(x'ff' AS TEXT)")
+        ),
+        "DROP TABLE cases",
+    ],
 )
-def test_a_series_that_lacks_something_is_not_reported_on(
-    statement: str, goes_on: bool, series: Path
-) -> None:
+def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series: Path) -> None:
     with series_file.connected(series) as connection:
         connection.execute(statement)
     refused = harness("report", series)
@@ -142,7 +142,7 @@ def test_a_series_that_lacks_something_is_not_reported_on(
     if "SET gap" in statement:
         with pytest.raises(InputError, match="gaps of case 3"):
             series_file.StoredGaps(series, 45)[[2, 3]]
-    if goes_on:
+    if re.search(r"'\[\]'|value = 1 |NULL|DROP", statement):  # each kind of damage once
         assert solve_series(series).exit_code in (0, 2)
 
 

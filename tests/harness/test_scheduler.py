@@ -23,7 +23,7 @@ import pytest
 import tiny_joint
 from rich.console import Console
 from strip_scene import write_strip
-from suite_runs import heed_interrupts, is_alive, rows_of, said_by, series_rows, wait_for
+from suite_runs import is_alive, rows_of, said_by, series_rows, wait_for
 
 from harness.measurement import scheduler
 from harness.measurement.monitored_call import TRIM, environment
@@ -205,7 +205,7 @@ def test_ctrl_c_in_a_terminal_ends_workers_without_a_word_of_theirs(tmp_path: Pa
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,
-        preexec_fn=heed_interrupts,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # as in a terminal
     )
     wait_for(lambda: series_rows(out))
     begun = psutil.Process(going.pid).children(recursive=True)
