@@ -12,6 +12,7 @@ import pytest
 from forked_processes import fork_measuring_processes
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
+SHARED = ("chromium", "cluster")  # fixtures that take long to make
 ON_WORKERS = ("harness.measurement.task", "harness.placement.session", "harness.series.executors")
 
 gc.set_threshold(20_000, 20, 100)  # by default a tenth of the time, with all that the tests import
@@ -38,15 +39,20 @@ def _forked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.fixture
-def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Answers have none, all else a blank one: they take longer than all the rest."""
+def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures take longer than all the rest."""
     from matplotlib.image import imsave
 
     def blank(_: object, file: Path, **__: Any) -> None:
         imsave(file, [[(1.0, 1.0, 1.0)] * 40] * 30, format="png")
 
-    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", blank)
+
+
+@pytest.fixture
+def without_pictures(blank_pictures: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Answers have none, all else a blank one."""
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
 
 
 @pytest.fixture
@@ -77,11 +83,12 @@ def cluster() -> Iterator[Any]:
     They and those that follow them are forked from a process that has imported what they need.
     """
     dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
-    settings = {"scheduler.allowed-failures": 1, "nanny.pre-spawn-environ": {}}
-    settings |= {"worker.multiprocessing-method": "forkserver"}
-    with dask.config.set({f"distributed.{name}": value for name, value in settings.items()}):
+    at_start = {"distributed.scheduler.allowed-failures": 1, "distributed.nanny.pre-spawn-environ": {}}
+    with dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
         distributed.utils.get_mp_context().set_forkserver_preload(["distributed", *ON_WORKERS])
-        with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
+        with dask.config.set(at_start):
+            made = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0")
+        with made:
             yield made
 
 
@@ -92,5 +99,12 @@ def copy(finished: Path, tmp_path: Path) -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Quick tests first."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
+    """Quick tests first, then those with the browser and those with the cluster: one process starts it, as
+    another one of pytest-xdist takes its work from the end.
+    """
+
+    def place(item: pytest.Item) -> list[bool]:
+        fixtures = getattr(item, "fixturenames", ())
+        return [item.get_closest_marker("slow") is not None, *(f not in fixtures for f in SHARED)]
+
+    items.sort(key=place)

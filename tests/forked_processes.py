@@ -1,34 +1,36 @@
-"""Measuring processes forked from that of the tests, which has imported all they need: a start takes a
-fiftieth of its time. What starts them is unchanged, and so are their limits and their ends.
+"""Measuring processes, and commands of the project, forked from the process of the tests, which has imported
+all they need: a start takes a fiftieth of its time. What starts them is unchanged, and so are their limits
+and their ends.
 """
 
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any, NoReturn
 
 import pytest
 
+from harness.cli import app
 from harness.measurement import child_process, monitored_call
 
 LEAST_MIB = 8192
 
 
 class Forked:
-    """The part of subprocess.Popen that a monitored call uses."""
+    """A call in a fork, with the part of subprocess.Popen that is used of it."""
 
-    def __init__(
-        self, command: Sequence[str], *, env: dict[str, str], pass_fds: Sequence[int], **_: Any
-    ) -> None:
+    def __init__(self, call: Callable[[], None], env: dict[str, str], *kept: int) -> None:
         job, self_job = os.pipe()
         self_stdout, stdout = os.pipe()
         self_stderr, stderr = os.pipe()
         self.returncode: int | None = None
         self.pid = os.fork()
         if self.pid == 0:
-            _become_child(env, job, stdout, stderr, *pass_fds)
+            _become_child(call, env, (job, stdout, stderr), kept)
         for child_end in (job, stdout, stderr):
             os.close(child_end)
         self.stdin = os.fdopen(self_job, "wb")
@@ -44,21 +46,52 @@ class Forked:
     def wait(self) -> int | None:
         return self.poll(options=0)
 
+    def send(self, sent: int) -> None:
+        os.kill(self.pid, sent)
 
-def _become_child(env: dict[str, str], job: int, stdout: int, stderr: int, events: int) -> NoReturn:
+    def ended(self) -> tuple[int | None, str]:
+        """Its exit code, and what it has said on stderr: little, or it waits for a reader."""
+        with self.stdin, self.stdout, self.stderr:
+            return self.wait(), self.stderr.read().decode()
+
+
+def _become_child(
+    call: Callable[[], None], env: dict[str, str], streams: Sequence[int], kept: Sequence[int]
+) -> NoReturn:
+    code = 1
     try:
         os.setsid()
-        os.dup2(job, 0)
-        os.dup2(stdout, 1)
-        os.dup2(stderr, 2)
-        for low, high in ((3, events), (events + 1, 1024)):
+        for k, stream in enumerate(streams):
+            os.dup2(stream, k)
+        for low, high in zip((3, *(k + 1 for k in kept)), (*kept, 1024), strict=True):
             os.closerange(low, high)
-        sys.stdin, sys.stdout, sys.stderr = (os.fdopen(k, "rw"[k > 0]) for k in range(3))
+        sys.stdin, sys.stdout, sys.stderr = (os.fdopen(k, "rw"[k > 0], closefd=False) for k in range(3))
         os.environ.clear()
         os.environ.update(env)
-        child_process.main()
+        call()
+    except SystemExit as end:
+        code = int(end.code or 0)
+    except BaseException:
+        traceback.print_exc()
     finally:
-        os._exit(1)
+        try:
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os._exit(code)
+
+
+def forked_command(*words: object, before: Callable[[], object] = lambda: None) -> Forked:
+    """`python -m harness`, which no test with workers of Dask may fork. before : called in the child."""
+
+    def call() -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        sys.argv[1:] = map(str, words)
+        before()
+        app.main()
+
+    return Forked(call, dict(os.environ))
 
 
 def fork_measuring_processes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -75,9 +108,10 @@ def fork_measuring_processes(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(monitored_call.Monitored, "_exceeded", exceeded)
 
-    def start(command: Sequence[str], **options: Any) -> Any:
-        kind = Forked if command[0] == sys.executable else subprocess.Popen
-        return kind(command, **options)
+    def start(command: Sequence[str], *, env: dict[str, str], pass_fds: Sequence[int], **options: Any) -> Any:
+        if command[0] == sys.executable:
+            return Forked(child_process.main, env, *pass_fds)
+        return subprocess.Popen(command, env=env, pass_fds=pass_fds, **options)
 
     made = SimpleNamespace(Popen=start, PIPE=subprocess.PIPE, DEVNULL=subprocess.DEVNULL)
     monkeypatch.setattr(monitored_call, "subprocess", made)

@@ -1,13 +1,10 @@
-"""A plug-in that misbehaves as a test says, and commands on it in processes of their own."""
+"""A plug-in that misbehaves as a test says, and a command on it that is interrupted."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
-from suite_runs import all_end, heed_interrupts, wait_for
-
-ROOT = Path(__file__).parents[1]
+import psutil
+from forked_processes import forked_command
+from suite_runs import is_alive, wait_for
 
 #: A plug-in: {0} runs when it is imported, {1} in solve, which has `lam`, the right answer.
 PLUGIN = """
@@ -37,30 +34,15 @@ def write(folder: Path, at_import: str = "", in_solve: str = "pass") -> Path:
     return path
 
 
-def command(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "harness", *map(str, arguments)]
-
-
-def environment(folder: Path) -> dict[str, str]:
-    """The cache of this test alone: it marks its processes."""
-    return {**os.environ, "RIVETBENCH_CACHE": str(folder / "cache")}
-
-
-def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> None:
+def interrupt(words: list[object], begun: Path, sent: int) -> None:
     """Once the command has made the file `begun`, the signal ends it and all that it started, with words."""
-    going = subprocess.Popen(
-        arguments,
-        cwd=ROOT,
-        env=environment(folder),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heed_interrupts,
-    )
+    going = forked_command(*words)
     wait_for(begun.exists)
-    going.send_signal(sent)
-    _, said = going.communicate(timeout=30)  # it would sleep for 60 s
-    assert going.returncode == 130
+    started = psutil.Process(going.pid).children(recursive=True)
+    going.send(sent)
+    code, said = going.ended()
+    assert code == 130
     assert "Interrupted" in said
     assert "Traceback" not in said
-    assert all_end(folder / "cache")
+    assert started
+    wait_for(lambda: not any(map(is_alive, started)))

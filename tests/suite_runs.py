@@ -1,6 +1,5 @@
 """Runs of a suite: what they say, their rows, answers that were moved, and the processes that they leave."""
 
-import signal
 import time
 from io import StringIO
 from pathlib import Path
@@ -54,11 +53,6 @@ def series_rows(directory: Path) -> list[Row]:
         return []
 
 
-def heed_interrupts() -> None:
-    """As in a terminal: a shell starts what it puts in the background with SIGINT ignored."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 def wait_for(condition: Any) -> Any:
     """What the condition gives once that is true."""
     deadline = time.monotonic() + 60
@@ -68,13 +62,24 @@ def wait_for(condition: Any) -> Any:
     return found
 
 
+def is_alive(process: psutil.Process) -> bool:
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
 def processes(cache: Path) -> list[psutil.Process]:
-    """Those that were started with this cache, which marks a test's own."""
-    living = []
+    """Those that were started with this cache, which marks a test's own, and forks of this process, which no
+    variable marks; a fork whose parent has ended is not among them.
+    """
+    living, here = [], psutil.Process()
+    descendants = here.children(recursive=True)
     for process in psutil.process_iter():
         try:
-            ours = process.environ().get("RIVETBENCH_CACHE") == str(cache)
-            if ours and process.status() != psutil.STATUS_ZOMBIE:
+            fork = process in descendants and process.cmdline() == here.cmdline()
+            ours = fork or process.environ().get("RIVETBENCH_CACHE") == str(cache)
+            if ours and is_alive(process):
                 living.append(process)
         except psutil.Error:
             continue

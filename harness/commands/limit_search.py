@@ -119,8 +119,8 @@ def tolerance(
     Examples
     --------
     >>> from rivetbench import GapCases, tolerance
-    >>> find, few = "initial_gap.random.sd=0.01:0.4", GapCases(count=20)
-    >>> most = tolerance("examples/small-joint.toml", "results/sd", find, 0.05, resolution=0.1, cases=few)
+    >>> find, few = "initial_gap.random.sd=0.01:0.4", GapCases(count=10)
+    >>> most = tolerance("examples/small-joint.toml", "results/sd", find, 0.05, resolution=0.25, cases=few)
     >>> most.interval[0] <= most.value < most.interval[1]
     True
     """

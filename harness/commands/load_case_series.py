@@ -112,7 +112,7 @@ def run_series(
     Examples
     --------
     >>> from rivetbench import run_series
-    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["initial_gap.mean=0.8,0.9"])
+    >>> done = run_series("gallery/installed-fasteners", "results/tips", sweep=["initial_gap.mean=0.6,0.7"])
     >>> [row["verdict"] for row in done.rows]
     ['within', 'within']
     """

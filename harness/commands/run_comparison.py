@@ -63,7 +63,7 @@ def compare(
     Examples
     --------
     >>> from rivetbench import Overrides, compare, run
-    >>> change = Overrides(scenes=("gallery/three-part-stack",), solvers=("gi",), forms=("dual",))
+    >>> change = Overrides(scenes=("gallery/heavy-sheet-on-tool",), solvers=("gi",), forms=("dual",))
     >>> outcome = run("gate", "results/gi", change)
     >>> [comparison.worse for comparison in compare("results/gi", "results/gi")]
     [False]

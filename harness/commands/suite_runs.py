@@ -85,7 +85,7 @@ def run(
     Examples
     --------
     >>> from rivetbench import Overrides, run
-    >>> change = Overrides(scenes=("gallery/three-part-stack",), solvers=("gi",), forms=("dual",))
+    >>> change = Overrides(scenes=("gallery/heavy-sheet-on-tool",), solvers=("gi",), forms=("dual",))
     >>> outcome = run("gate", "results/gi", change)
     >>> {row["verdict"] for row in outcome.rows}
     {'within'}
@@ -128,8 +128,8 @@ def report(directory: str | Path) -> Path:
     Examples
     --------
     >>> from rivetbench import report, run_series
-    >>> done = run_series("gallery/three-part-stack", "results/stack", sweep=["initial_gap.mean=0.8,0.9"])
-    >>> report("results/stack").name
+    >>> done = run_series("gallery/installed-fasteners", "results/tips", sweep=["initial_gap.mean=0.6,0.7"])
+    >>> report("results/tips").name
     'report.md'
     """
     directory = Path(directory)

@@ -91,7 +91,7 @@ def export(
     Examples
     --------
     >>> from rivetbench import export
-    >>> export("gallery/three-part-stack", "stack.npz", format="npz").exists()
+    >>> export("gallery/installed-fasteners", "tips.npz", format="npz").exists()
     True
     """
     out = Path(out)

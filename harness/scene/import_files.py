@@ -48,7 +48,7 @@ def import_matrices(files: Sequence[str], out: str | Path, *, reporter: Reporter
     Examples
     --------
     >>> from rivetbench import export, import_matrices
-    >>> op4 = export("gallery/three-part-stack", "stack.op4", format="op4")
+    >>> op4 = export("gallery/installed-fasteners", "tips.op4", format="op4")
     >>> import_matrices([str(op4)], "mine.npz").name
     'mine.npz'
     """

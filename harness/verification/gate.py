@@ -120,7 +120,7 @@ def gate(
     Examples
     --------
     >>> from rivetbench import Overrides, gate, run
-    >>> change = Overrides(scenes=("gallery/three-part-stack",), solvers=("gi",), forms=("dual",))
+    >>> change = Overrides(scenes=("gallery/heavy-sheet-on-tool",), solvers=("gi",), forms=("dual",))
     >>> outcome = run("gate", "results/gi", change)
     >>> gate("results/gi").sentences
     ('Passed: 1 gated row is within 1e-07 mm.',)

@@ -109,7 +109,7 @@ def test_a_file_that_holds_no_series_is_named(damage: Any, series: Path) -> None
     refused = harness("report", series)
     assert refused.exit_code == 2
     assert SERIES in refused.output
-    if damage is not CUTS[0]:  # an empty file is a new database
+    if damage in (CUTS[1], pipe):
         assert solve_series(series).exit_code == 2
 
 
@@ -145,7 +145,8 @@ def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series
     if "SET gap" in statement:
         with pytest.raises(InputError, match="gaps of case 3"):
             series_file.StoredGaps(series, 45)[[2, 3]]
-    assert solve_series(series).exit_code in (0, 2)
+    if re.search(r"'\[\]'|value = 1 |NULL|DROP", statement):  # each kind of damage once
+        assert solve_series(series).exit_code in (0, 2)
 
 
 def test_a_series_whose_damage_sqlite_cannot_spell_is_named(tmp_path: Path) -> None:

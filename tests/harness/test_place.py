@@ -582,11 +582,6 @@ def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) ->
     assert done.exit_code == 2
     assert "has plan of another command: name another directory" in done.output
     assert not (tmp_path / PLANS).exists()
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / PLANS).touch()
-    done = harness("series", strip, "--cases", 2, "--out", tmp_path / "other")
-    assert done.exit_code == 2
-    assert f"has {PLANS} of another command: name another directory" in done.output
 
 
 class ReachedError(Exception):

@@ -1,4 +1,4 @@
-"""Which code a row is of: in a work tree, installed, or neither; each asked of a copy in its own process."""
+"""Which code a row is of: in a work tree, installed, or neither."""
 
 import json
 import os
@@ -60,18 +60,22 @@ def committed(folder: Path) -> str:
 
 
 def code_of(folder: Path, **environment: str) -> tuple[str, bool | None]:
-    """What the packages in that folder say. Compiled files would be untracked, as no .gitignore is copied."""
-    variables = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", **environment}
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", ASK], env=variables, check=True, capture_output=True, cwd=folder.parent
-    )
-    said = json.loads(done.stdout)
-    return said["commit"], said["clean"]
+    """What the packages in that folder say."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("harness.results.provenance.ROOT", folder)
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        return provenance()["commit"], provenance()["clean"]
 
 
 def test_a_commit_of_documents_or_results_is_no_other_code(tree: Path) -> None:
+    """Asked of a copy in its own process first, without compiled files: no .gitignore is copied."""
     code = committed(tree)
     assert len(code) == 40
+    variables = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+    words = [sys.executable, "-P", "-c", ASK]
+    done = subprocess.run(words, env=variables, capture_output=True, cwd=tree.parent)
+    assert json.loads(done.stdout) == {"commit": code, "clean": True}
     (tree / "results").mkdir()
     for name in ("results/measurements.jsonl", "README.md"):
         (tree / name).write_text("said\n")

@@ -5,8 +5,6 @@ measured again, `run DIR --key KEY`.
 import json
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,8 +14,9 @@ import psutil
 import pytest
 import tiny_joint
 from commands import harness
+from forked_processes import forked_command
 from rich.console import Console
-from suite_runs import gated, heed_interrupts, moved, rows_of, said_by, wait_for
+from suite_runs import gated, is_alive, moved, rows_of, said_by, wait_for
 
 from harness.measurement.solver_descriptions import Description, resumed
 from harness.measurement.suite_run import run
@@ -30,7 +29,6 @@ from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
 CONTRACT = {
     "suite", "scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeat",
     "status", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s",
@@ -290,22 +288,20 @@ def test_an_interrupted_run_keeps_its_rows_and_goes_on(folder: Path) -> None:
     options = {fault = "gives_up"}
     [[solver]]
     name = "faulty"
-    variant = "hangs"
-    options = {fault = "hang"}
+    variant = "sleeps"
+    options = {fault = "sleep"}
     """
     suite = tiny_joint.write_suite(here, text, plugin="faulty.py", time_limit_s=100)
     (here / "faulty.py").write_text(tiny_joint.FAULTY)
     rows = here / "out" / records.MEASUREMENTS
-    command = [sys.executable, "-m", "harness", "run", str(suite), "--out", str(here / "out")]
-    going = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, preexec_fn=heed_interrupts)
+    going = forked_command("run", suite, "--out", here / "out")
     workers = wait_for(lambda: rows.exists() and rows.read_bytes() and psutil.Process(going.pid).children())
     second = harness("run", suite, "--out", here / "out")
     assert second.exit_code == 2
     assert "another run is writing here" in second.stderr
-    os.kill(going.pid, signal.SIGINT)
-    going.communicate(timeout=30)
-    assert going.returncode == 130
-    wait_for(lambda: not any(worker.is_running() and worker.status() != "zombie" for worker in workers))
+    going.send(signal.SIGINT)
+    assert going.ended()[0] == 130
+    wait_for(lambda: not any(map(is_alive, workers)))
     before = rows.read_bytes()
     _, text = said_by(run, read_suite(str(suite)).model_copy(update={"time_limit_s": 0.2}), here / "out")
     assert "2 measurements, 1 of them already" in text

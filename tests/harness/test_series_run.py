@@ -1,9 +1,7 @@
 """A series from the command line to rows and gaps, against independent answers; ended, resumed, refused."""
 
-import os
 import resource
 import signal
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 import tiny_joint
 from commands import harness
+from forked_processes import forked_command
 from rich.console import Console
 from small_problems import solve_by_nnls
 from strip_scene import write_strip
@@ -33,8 +32,7 @@ from rivetbench import run_series
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
-COMMAND = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1"]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+COMMAND = ("series", "strip.toml", "--threads", "1")
 SLOW = tiny_joint.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
 
 
@@ -50,7 +48,7 @@ def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def series(*arguments: str, code: int = 0) -> Any:
-    ended = harness("series", "strip.toml", "--threads", "1", *arguments)
+    ended = harness(*COMMAND, *arguments)
     assert ended.exit_code == code, ended.output
     return ended
 
@@ -159,16 +157,16 @@ def test_memory_that_ran_out_is_asked_for_again(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_full_disk_leaves_whole_cases() -> None:
     def small() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        sys.dont_write_bytecode = True
         resource.setrlimit(resource.RLIMIT_FSIZE, (2**17, 2**17))
 
-    command = [*COMMAND, "--cases", "900", "--solver", "gi", "--check", "0", "--out", "full"]
-    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, preexec_fn=small)
-    assert done.returncode == 2
-    assert SERIES in done.stderr
-    assert "Traceback" not in done.stderr
+    many = ("--cases", "500", "--solver", "gi", "--check", "0", "--out", "full")
+    code, said = forked_command(*COMMAND, *many, before=small).ended()
+    assert code == 2
+    assert SERIES in said
+    assert "Traceback" not in said
     kept = rows_of("full")
-    assert 0 < len(kept) == len(gaps_of("full")) < 900
+    assert 0 < len(kept) == len(gaps_of("full")) < 500
 
 
 def test_a_directory_holds_one_kind_of_result(tmp_path: Path) -> None:
@@ -204,11 +202,11 @@ def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_a_kill_loses_and_doubles_no_row() -> None:
     slow = ("--cases", "80", "--solver", "slow", "--plugin", "slow.py", "--out", "killed")
-    process = subprocess.Popen([*COMMAND, *slow], env=ENVIRONMENT, stdout=subprocess.DEVNULL)
+    going = forked_command(*COMMAND, *slow)
     wait_for(lambda: series_rows(Path("killed")))
-    assert process.poll() is None
-    process.kill()
-    process.wait()
+    assert going.poll() is None
+    going.send(signal.SIGKILL)
+    going.ended()
     kept = rows_of("killed")
     assert 0 < len(kept) < 80
     series(*slow)

@@ -168,7 +168,8 @@ def test_a_change_of_loads_alone_reuses_the_assembly(tmp_path: Path, monkeypatch
 def test_only_what_is_called_for_is_imported(solved: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
     """Through the whole command, pictures included. The page's map is in the cache, from `solved`."""
     (tmp_path / "scene.toml").write_text(APART)
-    code = "import sys\nfrom harness.cli.app import main\ntry:\n    main()\nfinally:\n    print(*sys.modules)"
+    code = "import sys, report.figures.style as style\nfrom harness.cli.app import main\nstyle.DPI = 40\n"
+    code += "try:\n    main()\nfinally:\n    print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code, "solve", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out")],
         cwd=ROOT,

@@ -94,6 +94,7 @@ def test_export_is_the_last_stage(staged: Path, tmp_path: Path) -> None:
     assert validate(staged) is not None
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_the_history_is_in_all_that_solve_writes(
     staged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

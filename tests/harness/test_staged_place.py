@@ -122,9 +122,7 @@ def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_workers_and_an_interrupted_search_find_the_same(
-    path: Path, tmp_path: Path, cluster: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_find_the_same(path: Path, tmp_path: Path, cluster: Any) -> None:
     movable = MovableFasteners.of(read_scene(str(path)))
     bare, holes = movable.bare, plan_of(grid(movable.bare, 2, 2))
     study = FastenerStudy(bare, random_gaps(bare, CASES, 0), "dual", movable)
@@ -138,19 +136,6 @@ def test_workers_and_an_interrupted_search_find_the_same(
     whole = searched("whole")
     with workers(cluster.scheduler_address, console_of(SILENT)) as pool:
         assert searched("workers", pool) == whole
-    keep = AnswerJournal._keep
-
-    def interrupted(self: AnswerJournal, *answer: Any) -> None:
-        keep(self, *answer)
-        if len(self.answers) == 3:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(AnswerJournal, "_keep", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            searched("parts")
-    assert len((tmp_path / "parts").read_text().splitlines()) == 1 + 3
-    assert searched("parts") == whole
 
 
 def test_a_plan_without_fasteners_has_stages_without_them(path: Path, tmp_path: Path) -> None:

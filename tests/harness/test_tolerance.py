@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import harness, onto
-from scipy.stats import binom, binomtest, norm
+from scipy.stats import binomtest
 from strip_scene import write_strip
 
 from harness.commands import limit_search
@@ -153,16 +153,6 @@ def test_bisection_finds_the_limit_and_its_interval() -> None:
         ends = (sure, impossible) if falling else (impossible, sure)
         assert outcome.interval == (max(ends[0], default=-inf), min(ends[1], default=inf))
         assert len(set(asked)) <= 2 + 3 * np.ceil(np.log2(size + 1))
-
-
-@pytest.mark.parametrize(("count", "share"), [(400, 0.95), (100, 0.9), (100, 0.95), (200, 0.95), (200, 0.99)])
-def test_the_interval_covers_the_share_in_about_95_percent(count: int, share: float) -> None:
-    """The exact probability; at its ends (k/n − s)² = z² s (1 − s)/n (Wilson, JASA 22:209–212, 1927)."""
-    intervals = np.array([share_interval(kept, count) for kept in range(count + 1)])
-    away = (np.arange(count + 1)[:, None] / count - intervals) ** 2
-    np.testing.assert_allclose(away, norm.ppf(0.975) ** 2 * intervals * (1 - intervals) / count, atol=1e-12)
-    covers = (intervals[:, 0] <= share) & (share <= intervals[:, 1])
-    assert 0.93 <= binom.pmf(np.flatnonzero(covers), count, share).sum() <= 0.97
 
 
 def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -68,7 +68,9 @@ def test_springs_and_contacts_balance_what_the_parts_without_them_resist(tmp_pat
     assert [float(row["force_N"]) for row in table] == [entry["force_N"] for entry in forces]
 
 
-def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path) -> None:
+def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the pictures, those of both scenes are looked at."""
+    monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     first = write(tmp_path / "before.toml", JOINT)
     second = write(tmp_path / "after.toml", JOINT + FASTENERS + SPRINGS)
     done = harness("solve", first, second, "--out", tmp_path / "both", "--allow-gap", 0.29)

@@ -1,14 +1,14 @@
 """Runs among faults: whatever befalls the solvers, the disk or the harness, no finished row is lost."""
 
-import os
 import resource
-import subprocess
+import signal
 import sys
 from io import StringIO
 from pathlib import Path
 
 import pytest
 import tiny_joint
+from forked_processes import forked_command
 from rich.console import Console
 from suite_runs import rows_of, wait_for
 
@@ -17,8 +17,6 @@ from harness.planning.suite import read_suite
 from harness.results import records
 
 pytestmark = pytest.mark.slow
-
-ROOT = Path(__file__).parents[2]
 
 
 def suite_of(folder: Path, rows: int) -> Path:
@@ -33,42 +31,36 @@ def quietly(suite: Path, directory: Path) -> int:
     return run(read_suite(str(suite)), directory, Console(file=StringIO()))
 
 
-def command(suite: Path, directory: Path) -> list[str]:
-    return [sys.executable, "-m", "harness", "run", str(suite), "--out", str(directory)]
-
-
 def test_a_run_killed_again_and_again_ends_with_every_row_once(tmp_path: Path) -> None:
-    suite = suite_of(tmp_path, 4)
+    suite = suite_of(tmp_path, 6)
     out = tmp_path / "out"
     rows, seen = out / records.MEASUREMENTS, b""
     for enough in (1, 3):
-        going = subprocess.Popen(command(suite, out), cwd=ROOT, stdout=subprocess.DEVNULL)
+        going = forked_command("run", suite, "--out", out)
         wait_for(lambda: rows.exists() and rows.read_bytes().count(b"\n") >= enough)  # noqa: B023
-        going.kill()
-        going.wait()
+        going.send(signal.SIGKILL)
+        assert going.ended()[0] == -signal.SIGKILL
         assert rows.read_bytes().startswith(seen)
         seen = rows.read_bytes()[: rows.read_bytes().rfind(b"\n") + 1]
     quietly(suite, out)
     assert rows.read_bytes().startswith(seen)
-    assert [row["variant"] for row in rows_of(out)] == ["0", "1", "2", "3"]
+    assert [row["variant"] for row in rows_of(out)] == [str(k) for k in range(6)]
 
 
 def test_files_that_may_not_grow_are_said_and_resumed(tmp_path: Path) -> None:
-    """A quota by RLIMIT_FSIZE: three rows or so have room, and no compiled file, which Python cuts short."""
+    """A quota by RLIMIT_FSIZE: three rows or so have room; a compiled file would be cut short."""
     out = tmp_path / "out"
     quietly(suite_of(tmp_path, 1), out)
     suite = suite_of(tmp_path, 4)
     room = 3 * (out / records.MEASUREMENTS).stat().st_size
 
     def limited() -> None:
+        sys.dont_write_bytecode = True
         resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
 
-    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(
-        command(suite, out), cwd=ROOT, capture_output=True, text=True, preexec_fn=limited, env=environment
-    )
-    assert done.returncode == 2
-    assert "rows already written are safe" in done.stderr
+    code, said = forked_command("run", suite, "--out", out, before=limited).ended()
+    assert code == 2
+    assert "rows already written are safe" in said
     kept = (out / records.MEASUREMENTS).read_bytes()
     assert 1 < len(rows_of(out)) < 4
     quietly(suite, out)

@@ -1,6 +1,6 @@
 """Files of other programs in all their spellings: the right gaps, or a sentence that names the file, or both.
 
-100 draws; RIVETBENCH_LONG=1 takes 20 000, RIVETBENCH_LONG=N takes N.
+60 draws; RIVETBENCH_LONG=1 takes 20 000, RIVETBENCH_LONG=N takes N.
 """
 
 import io
@@ -296,7 +296,7 @@ def tried(log: Log, draw: Draw, folder: Path) -> None:
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_spellings_are_right_or_refused(part: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    log, count = Log(), draws(100, 20_000)
+    log, count = Log(), draws(60, 20_000)
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     for index in range(part, count, PARTS):
         (tmp_path / "work").mkdir()

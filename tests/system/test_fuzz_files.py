@@ -1,6 +1,6 @@
 """Hostile files without end: each command ends soon with a documented exit code and words, and loses no file.
 
-100 inputs; RIVETBENCH_LONG=1 takes 20 000, RIVETBENCH_LONG=N takes N.
+60 inputs; RIVETBENCH_LONG=1 takes 20 000, RIVETBENCH_LONG=N takes N.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ from hostile_targets import Target, all_targets, invoke
 from matplotlib.figure import Figure
 from sample_size import Fault, Log, draws
 
-SEED = 17
+SEED = 24
 TIME_LIMIT_S = 60  # per command
 DRAWN = 0.02  # of the inputs: pictures are saved, which takes a second
 MEMORY = 6 * 2**30  # bytes of address space: what reads without end is a fault before the machine is full
@@ -51,7 +51,7 @@ def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
 
 
 def test_hostile_files(targets: list[Target], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    log, count, save = Log(), draws(100, 20_000), Figure.savefig
+    log, count, save = Log(), draws(60, 20_000), Figure.savefig
     shares = np.array([target.share for target in targets])
     for index in range(count):
         random = np.random.default_rng([SEED, index])

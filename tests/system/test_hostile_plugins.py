@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import tiny_joint
 from commands import harness
-from plugin_commands import THREAD, command, interrupt, write
+from plugin_commands import THREAD, interrupt, write
 from suite_runs import all_end, rows_of
 
 import harness.conformance.isolated as isolated
@@ -111,7 +111,7 @@ def test_an_interrupt_ends_what_sleeps(tmp_path: Path, what: str) -> None:
     suite = tiny_joint.write_suite(tmp_path)
     plugin = write(tmp_path, *(("", begin) if what == "check" else (begin,)))
     arguments = [] if what == "check" else [suite, "--solver", "mine", "--out", tmp_path / "out"]
-    interrupt(command(what, *arguments, "--plugin", plugin), tmp_path, go, signal.SIGINT)
+    interrupt([what, *arguments, "--plugin", plugin], go, signal.SIGINT)
 
 
 #: What breaks the contract, and what is said of it; the last one spoils the cache.

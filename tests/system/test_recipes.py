@@ -17,11 +17,12 @@ RECIPES = dict(re.findall(r"^### (An? .+?)\n(.*?)(?=^###? )", PAGE, re.MULTILINE
 FILE = re.compile(r"```\w+\n# ([\w/.-]+)(?:, (after|instead of) ([^\n]+))?\n(.*?)```", re.DOTALL)
 PLACES = [found for recipe in RECIPES.values() for found in FILE.findall(recipe)]
 CODE = sorted({name for name, *_ in PLACES if name.endswith(".py") and not name.startswith("tests/")})
+CACHES = (".mypy_cache", ".import_linter_cache")  # of `.ci/run`, where it has been run
 FOLDERS = ("docs", "examples", "harness", "problems", "report", "rivetbench", "solvers", "studies", "tests")
 CHECKS = {
     "ruff": ["-m", "ruff", "check", "--no-cache"],
     "format": ["-m", "ruff", "format", "--check", "--no-cache"],
-    "mypy": ["-m", "mypy", "--follow-imports=silent", *CODE],
+    "mypy": ["-m", "mypy", *CODE],
     "layers": ["-c", "from importlinter.cli import lint_imports; raise SystemExit(lint_imports())"],
 }
 
@@ -30,7 +31,7 @@ CHECKS = {
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project with the files and lines of all recipes."""
     copy = tmp_path_factory.mktemp("recipes")
-    for name in FOLDERS:
+    for name in (*FOLDERS, *(cache for cache in CACHES if (ROOT / cache).is_dir())):
         shutil.copytree(ROOT / name, copy / name)
     for path in [ROOT / "results", *ROOT.glob("*.*")]:
         if path.is_file() or path.name == "results":
@@ -53,7 +54,9 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 #: Commands one after another, up to the first that fails, each forked from what has imported what most need.
 RUN = """
 import json, os, runpy, sys
-import harness.cli.suite, harness.scene.solve, matplotlib.pyplot, pytest, report.writers.suite_report
+import _hypothesis_pytestplugin, bokeh.plotting, harness.api, harness.cli.app, harness.conformance.isolated
+import harness.scene.solve, hypothesis, matplotlib.pyplot, pytest, report.writers.answer_report
+import report.writers.suite_report, solvers.registry
 for words in json.loads(sys.argv[1]):
     print("$", *words, flush=True)
     if (pid := os.fork()) == 0:

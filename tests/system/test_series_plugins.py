@@ -7,7 +7,7 @@ from typing import Any
 import psutil
 import pytest
 from commands import harness
-from plugin_commands import command, interrupt, write
+from plugin_commands import interrupt, write
 from strip_scene import write_strip
 from suite_runs import all_end
 
@@ -85,4 +85,4 @@ def test_on_workers_too(tmp_path: Path, cluster: Any) -> None:
 def test_a_signal_ends_what_sleeps(tmp_path: Path) -> None:
     go = tmp_path / "begun"
     going = series(tmp_path, in_solve=f"open({str(go)!r}, 'w'); time.sleep(60)")
-    interrupt(command(*going), tmp_path, go, signal.SIGTERM)
+    interrupt(going, go, signal.SIGTERM)
