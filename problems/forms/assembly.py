@@ -59,7 +59,7 @@ class Assembly:
     @cached_property
     def dependent(self) -> bool:
         """Whether contacts depend on one another: Q is singular then, and λ one of many."""
-        return is_dependent(self.A)
+        return is_dependent(self.A, self.K.units)
 
     @property
     def junction_size(self) -> int:
