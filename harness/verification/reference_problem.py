@@ -164,12 +164,17 @@ def measurable(
     is not positive definite.
     """
     problem = opened(read_scene(source), form, reporter, limit_s)
-    if problem.prepared.assembly.m == 0:
-        allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
-        raise InputError.one(source, "contacts", 0, allowed)
+    refuse_without_contacts(problem.prepared, source)
     reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()
     return problem
+
+
+def refuse_without_contacts(prepared: Prepared, where: object) -> None:
+    """Raise InputError if there is no contact, and nothing but linear equations to solve."""
+    if prepared.assembly.m == 0:
+        allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
+        raise InputError.one(where, "contacts", 0, allowed)
 
 
 def record(problem: ReferenceProblem, directory: Path) -> None:
