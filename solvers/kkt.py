@@ -85,7 +85,7 @@ def with_x(
 ) -> list[Answer]:
     """The answers, in the sparse form with x = K⁻¹(f − Aλ) refined by δ, and the status of this x.
 
-    "solved" if the KKT errors of y = g − Aᵀx are at most max(tolerance, min(ρ, ROUNDING_MM)), ρ the part due
+    "solved" if the KKT errors of y = g − Aᵀx are at most max(tolerance, min(ρ, 1e-7 mm)), ρ the part due
     to rounding: of g and x, of x as δ shows it, and of the forces, by e = ε|K⁻¹(|f| + |A|λ)|,
 
         ρ = 4ε|g| + 4 max(ε|A|ᵀ|x| + |A|ᵀ|δ|) + 4 max(|A|ᵀe).
@@ -106,7 +106,7 @@ def with_x(
     if not is_small(errors, tolerance, rounding):
         moved = assembly.K.solve(abs(cases.f) + abs(assembly.A) @ abs(lam))
         rounding = rounding + 4 * EPS * (size @ abs(moved)).max(axis=0)
-    rounding = np.minimum(rounding, ROUNDING_MM)
+    rounding = np.minimum(rounding, ROUNDING_MM / np.array([loads[k].length for k in with_lam]))
     for column, k in enumerate(with_lam):
         status, residual = refined[k].status, float(errors[:, column].max(initial=0.0))
         if status in ("solved", "inaccurate"):

@@ -102,10 +102,10 @@ class Units:
         """The load case in these units."""
         if self.unchanged:
             return load
-        f, g, energy = self.D * load.f / self.U, self.R * load.g / self.U, self.U**2
+        scaled = {"f": self.D * load.f / self.U, "g": self.R * load.g / self.U}
         if isinstance(load, DualLoadCase):
-            return read_only(DualLoadCase(f, g, self.R * load.p / self.U, energy=energy))
-        return read_only(LoadCase(f, g, energy=energy))
+            scaled["p"] = self.R * load.p / self.U
+        return read_only(replace(load, **scaled, energy=self.U**2, length=self.length))
 
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector, Vector, Vector | None]:
         """λ, gaps and x of a warm start, in these units."""

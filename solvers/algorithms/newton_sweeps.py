@@ -286,7 +286,7 @@ class Sweeps:
         if case.stalled:
             enough, rounding = tolerance, ROUNDING_FACTOR * floor
         if case.stalled >= STALLED:
-            enough = max(enough, STALLED_MM)
+            enough = max(enough, STALLED_MM / case.load.length)
         case.settled = right and is_small(errors, enough, rounding)
 
 

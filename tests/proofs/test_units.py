@@ -162,6 +162,9 @@ def test_the_duality_gap_may_have_as_many_newton_millimetres_as_the_tolerance_ha
     assert gap_tolerance(1e-10, scaled_load) == 1e-13  # rounding
     assert gap_tolerance(1e-300, scaled_load) == 1e-300  # asked for more than that
     assert gap_tolerance(1e-9, replace(scaled_load, energy=1e-6)) == 1e-9
+    larger = Units.of(given).of_loads([replace(load, f=2.0**12 * load.f, g=2.0**12 * load.g)])
+    assert larger.length > 1
+    assert gap_tolerance(1.0 / larger.length, larger.load(load)) == 1.0 / larger.U**2 > 1e-13
 
 
 # Answers.
