@@ -248,6 +248,9 @@ def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
     assert np.abs(prepared.recover(polished.lam, case) - expected_x).max() > 1e-7
     assert polished.status == "inaccurate"
     assert plain.status == "solved"
+    modelled = solved("cvxpy", {}, prepared, load, 1e-9)  # polishing is CVXPY's default
+    assert np.abs(prepared.recover(modelled.lam, case) - expected_x).max() > 1e-7
+    assert modelled.status == "inaccurate"
 
 
 @pytest.mark.parametrize(
