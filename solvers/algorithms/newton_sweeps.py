@@ -24,7 +24,8 @@ contacts (`contact_sets.yielding_set`), whose edges move further, or that of an 
 than further sets, so the limit on the sets of a sweep grows from sweep to sweep.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -57,7 +58,7 @@ class Case:
     last_step : the last step and Q times it, if it left the set unchanged. residual : max(|y_C|, max(−y)).
     stalled : sweeps in succession that did not halve it. settled : whether every sign is right and the
     residual small enough. doubt : a bound of the rounding that y has accumulated since it was last computed
-    from λ, mm, of each contact; infinite if y is not known.
+    from λ, mm, of each contact; infinite if y is not known. products : with Q, not with parts of it.
     """
 
     load: DualLoadCase
@@ -71,6 +72,7 @@ class Case:
     settled: bool = False
     sweeps: int = 0
     sets: int = 0
+    products: int = 0
 
 
 @dataclass
@@ -120,8 +122,9 @@ class Sweeps:
         """The cases of several loads, solved together. starts : a solved case for each load; by default all
         start from the solution of the first load.
         """
-        starts = starts or [self.solved(loads[0], tolerance)] * len(loads)
-        cases = self._sweep(self._begun(starts, loads), tolerance)
+        first = [] if starts else [self.solved(loads[0], tolerance)]
+        cases = self._sweep(self._begun(starts or first * len(loads), loads), tolerance)
+        cases[0].products += sum(case.products for case in first)
         for case in cases:
             case.factor = None  # as large as M for each; the next cases have other sets
         return cases
@@ -135,7 +138,8 @@ class Sweeps:
             zero = np.zeros(len(order))
             nothing = Case(load - load, zero > 0, TrialSolution(zero, zero, 0.0), doubt=0.0)
             (case,) = self._begun([nothing], [load])
-            case.C = case.C | (case.trial.y < 0) if self.M is not None else self.sets.first_set(load)
+            with self._counted(case):
+                case.C = case.C | (case.trial.y < 0) if self.M is not None else self.sets.first_set(load)
         else:
             lam, y = start.lam[order], start.gap[order]
             solved = Case(start.load, self.compliance * lam > y, TrialSolution(lam, y, 0.0))
@@ -144,8 +148,16 @@ class Sweeps:
             case.C = C[order]
         return self._sweep([case], tolerance)[0]
 
+    @contextmanager
+    def _counted(self, case: Case) -> Iterator[None]:
+        """Count the products with Q of the sets meanwhile."""
+        before = self.sets.products.made if self.M is None else 0
+        yield
+        case.products += self.sets.products.made - before if self.M is None else 0
+
     def answer(self, case: Case, tolerance: float) -> Answer:
-        """The answer of a solved case. Iterations are products with Q, inner iterations sets tried with M.
+        """The answer of a solved case. Iterations are sweeps, inner iterations sets tried with M; details
+        count the products with Q.
 
         "solved" if the errors, −y and |y| where λ > 0, are at most max(tolerance, `kkt.rounding_bound`) mm. y
         is recomputed from λ if they and `doubt` exceed the tolerance, or if a force was below zero.
@@ -155,10 +167,11 @@ class Sweeps:
         errors[self.order] += case.doubt
         if (errors > tolerance).any() or (case.trial.lam < 0).any():
             errors = kkt_errors(lam, self.gaps(lam[:, None], [case.load])[:, 0])
+            case.products += 1
         enough = is_small(errors, tolerance, rounding_bound(self.diagonal, case.load.p, lam))
-        limit = "" if case.settled else f"{self.most} products"
+        limit = "" if case.settled else f"{self.most} sweeps"
         status: Status = "solved" if enough else "inaccurate"
-        details, counts = {"closed": int(case.C.sum())}, (case.sweeps, case.sets)
+        details, counts = {"closed": int(case.C.sum()), "products": case.products}, (case.sweeps, case.sets)
         return dual_answer(status, lam, float(errors.max(initial=0.0)), details, counts, limit)
 
     def vectors(self, case: Case) -> tuple[Vector, Vector]:
@@ -186,7 +199,7 @@ class Sweeps:
             factor = case.factor and replace(case.factor, room=None)
             trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
             doubt = case.doubt + rounding_bound(self.compliance, load.p[self.order], lam)
-            begun.append(Case(load, C, trial, factor, doubt=doubt))
+            begun.append(Case(load, C, trial, factor, doubt=doubt, products=int(k in some)))
         return begun
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
@@ -197,7 +210,9 @@ class Sweeps:
         for _ in range(self.most):
             steps = []  # λ, whether the set is unchanged, and whether y follows by its change
             for case in active:
-                lam, same = self._step(case)
+                with self._counted(case):
+                    lam, same = self._step(case)
+                case.products += 1  # of the gaps below
                 rounding = rounding_bound(self.compliance, case.load.p[order], lam)
                 steps.append((case, lam, same, same and bool((case.doubt <= SMALL * rounding).all())))
             moved = np.empty((len(order), len(active)), order="F")
@@ -241,6 +256,7 @@ class Sweeps:
                 C, lam, factorisations = self.sets.interior_set(case.load)
                 C, lam = C[order], np.where(C, lam, 0.0)
                 y = self.gaps(lam[:, None], [case.load])[order, 0]
+                case.products += 1
                 case.trial = TrialSolution(lam[order], y, float(abs(y[C]).max(initial=0.0)))
                 at = partial(self.sets.set, case.trial)
             else:

@@ -296,7 +296,7 @@ def test_unsettled_forces_are_cut_at_zero_and_judged_as_such() -> None:
     wanted = residual(Q, p, answer.lam)
     assert wanted > TOLERANCE
     assert answer.details["kkt_residual_mm"] == pytest.approx(wanted)
-    assert "products" in answer.details["cause"]
+    assert "2 sweeps" in answer.details["cause"]
 
 
 def test_what_sweeps_settle_is_solved() -> None:
