@@ -130,7 +130,7 @@ class GivenModel:
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K with dense blocks. Raises InputError if contacts depend on one another."""
         assembly, _, seconds, key = self._read(sparse=False)
-        refuse_dependent(assembly.A, self.scene.source_of("A"))
+        refuse_dependent(assembly.A, assembly.K.units, self.scene.source_of("A"))
         K = assembly.K.as_dense()
         if K is not assembly.K:
             assembly = replace(assembly, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))

@@ -87,7 +87,7 @@ def gap_tolerance(tolerance: float, load: LoadCase) -> float:
 
     As many N·mm as the tolerance has mm, but at most the tolerance in scaled units, and above rounding.
     """
-    return min(tolerance, max(tolerance / load.energy, GAP_ROUNDING))
+    return min(tolerance, max(tolerance * load.length / load.energy, GAP_ROUNDING))
 
 
 def clipped(answer: Answer, tolerance: float) -> Answer:

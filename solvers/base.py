@@ -220,7 +220,7 @@ class Solver(ABC):
         return state
 
     def update(self, state: Any, ready: Any, load: Any, tolerance: float, start: WarmStart) -> Any:
-        """Set up a further load case of the same assembly and tolerance; by default by `setup`.
+        """Set up a further load case of the same assembly; by default by `setup`.
 
         Parameters
         ----------
@@ -231,7 +231,7 @@ class Solver(ABC):
         load : LoadCase
             The next load case.
         tolerance : float
-            The tolerance of the series.
+            That of this load case: in other units than the one before, it is another number.
         start : WarmStart
             A solved case from which to start, not necessarily the one before.
 

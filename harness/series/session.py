@@ -20,6 +20,7 @@ from harness.solving.session import SolverSession
 from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import best_of_candidates, proof_of
+from harness.verification.reference_problem import refuse_without_contacts
 from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
@@ -128,6 +129,7 @@ class SeriesSession(Reporter):
         self.block_time_s = 0.0 if report else BLOCK_TIME_S
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)
+        refuse_without_contacts(self.data, job.scene.source_of("A"))
         self.block = min(BLOCK, max(BLOCK_BYTES // (8 * self.data.assembly.n), 1))
         self.proof = proof_of(self.data)
         self.gap_error = GapError.of(self.data.assembly)

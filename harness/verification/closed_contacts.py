@@ -36,10 +36,15 @@ class ScaledInverse:
         return cls(None, np.ones(len(R)), R)
 
     def forces(self, v: Vector, C: Mask) -> Vector:
-        """u (m,) with about (Qu)_C = v_C: M v, or Q_CC⁻¹v_C. There is M or Q."""
+        """u (m,) with about (Qu)_C = v_C: M v, or Q_CC⁻¹v_C; zero if rounding makes Q_CC indefinite.
+
+        There is M or Q.
+        """
         if self.Q is None:
             return self.product(v)
-        return ClosedFactor(self.Q).solve(C, v / self.R) / self.R
+        with suppress(np.linalg.LinAlgError):
+            return ClosedFactor(self.Q).solve(C, v / self.R) / self.R
+        return np.zeros_like(v)
 
     def product(self, v: Vector) -> Vector:
         """M v."""

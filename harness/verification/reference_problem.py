@@ -163,14 +163,18 @@ def measurable(
     """Open or build a scene, or that of a name or path, that a solver can be measured on. Raises InputError,
     also if K is not positive definite.
     """
-    scene = read_scene(source) if isinstance(source, str) else source
-    problem = opened(scene, form, reporter, limit_s)
-    if problem.prepared.assembly.m == 0:
-        allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
-        raise InputError.one(scene.source_of("A"), "contacts", 0, allowed)
+    problem = opened(read_scene(source) if isinstance(source, str) else source, form, reporter, limit_s)
+    refuse_without_contacts(problem.prepared, problem.scene.source_of("A"))
     reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()
     return problem
+
+
+def refuse_without_contacts(prepared: Prepared, where: object) -> None:
+    """Raise InputError if there is no contact, and nothing but linear equations to solve."""
+    if prepared.assembly.m == 0:
+        allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
+        raise InputError.one(where, "contacts", 0, allowed)
 
 
 def record(problem: ReferenceProblem, directory: Path) -> None:

@@ -59,7 +59,7 @@ class Assembly:
     @cached_property
     def dependent(self) -> bool:
         """Whether contacts depend on one another: Q is singular then, and λ one of many."""
-        return is_dependent(self.A)
+        return is_dependent(self.A, self.K.units)
 
     @property
     def junction_size(self) -> int:
@@ -95,8 +95,9 @@ class LoadCase:
     g : array (m,), mm
         Initial gaps at the contacts; negative where the parts overlap.
     energy : float, N·mm
-        The energy that a unit of the objective stands for: 1 in mm and N. A solver that stops by a duality
-        gap divides its tolerance by it.
+        The energy that a unit of the objective stands for: 1 in mm and N.
+    length : float, mm
+        The length that a unit of the gaps stands for: 1 in mm and N. The tolerance is divided by it.
 
     Examples
     --------
@@ -108,6 +109,7 @@ class LoadCase:
     f: Vector
     g: Vector
     energy: float = field(default=1.0, kw_only=True)
+    length: float = field(default=1.0, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ class DualLoadCase(LoadCase):
         Initial gaps.
     p : array (m,), mm
         AᵀK⁻¹f − g, the overlap of the parts if contact is ignored.
-    energy : float, N·mm
+    energy, length : float, N·mm and mm
         As in a LoadCase.
     """
 

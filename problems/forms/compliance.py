@@ -46,8 +46,19 @@ class DenseCompliance:
         return product(self.Q, lam)
 
 
-Compliance = ComplianceProducts | DenseCompliance
+@dataclass
+class CountedProducts:
+    """Products with Q, and how many were made."""
 
+    Q: ComplianceProducts | DenseCompliance
+    made: int = 0
+
+    def __matmul__(self, lam: Vector) -> Vector:
+        self.made += 1
+        return self.Q @ lam
+
+
+Compliance = ComplianceProducts | DenseCompliance | CountedProducts
 
 SAMPLE = 3  # contacts, for the size of Q
 SETS = 15  # factorisations of K that settle the contacts without M

@@ -152,7 +152,7 @@ class Prepared:
             return dual
         columns = self.overlap(stacked(loads)).T
         pairs = zip(loads, columns, strict=True)
-        return [DualLoadCase(load.f, load.g, np.ascontiguousarray(p)) for load, p in pairs]
+        return [DualLoadCase(**vars(load) | {"p": np.ascontiguousarray(p)}) for load, p in pairs]
 
     def gaps(self, lam: Matrix, loads: Sequence[DualLoadCase]) -> Matrix:
         """y = g − Aᵀx of x = K⁻¹(f − Aλ), (m, k) mm for λ (m, k).

@@ -11,7 +11,8 @@ and the dual form's Q and p become RQR and Rp/U. All are powers of two, so nothi
         model says to be displacements in mm. In the dual form, which has no x, D = 1
     R   contacts of unit length: max_i D_i|a_ij| R_j between 1/√2 and √2
     U   ℓ/δ, with δ the median of D at the contacts. ℓ, the length of a scaled displacement there, is 1 mm
-        if max |g|, or the larger of it and max |f_i|/k_ii, is between 2⁻⁸ and 2⁸ mm; else about the latter
+        if max |g|, or the larger of it and max |f_i|/k_ii, is between 2⁻⁸ and 2⁸ mm; else about the latter.
+        A gap of 2³⁰ times what loads and overlaps move does not count: nothing reaches it
 
 So a joint in mm is passed on untouched in a dense form, and its gaps are in mm in every form, where a
 tolerance of τ/ℓ on them means τ mm. D and R belong to the assembly, U to a load case, and to those that are
@@ -30,6 +31,7 @@ from .assembly import DualLoadCase, LoadCase, Vector
 from .problem import Problem, in_form, read_only
 
 USUAL = 2.0**8  # mm: displacements between this and its inverse need no unit of their own
+FAR = 2.0**30  # times max |f_i|/k_ii and the largest overlap: beyond all displacements
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,13 @@ class Units:
 
     def _size(self, loads: Sequence[LoadCase]) -> float:
         """An estimate of the displacements, mm."""
-        size = max((float(abs(self.delta * self.R * load.g).max(initial=0.0)) for load in loads), default=0.0)
-        return size if _usual(size) else max(size, *(self._moved(load) for load in loads))
+        gaps = self.delta * self.R * np.array([load.g for load in loads])
+        size = float(abs(gaps).max(initial=0.0))
+        if _usual(size):
+            return size
+        moved = max(map(self._moved, loads))
+        reach = FAR * max(moved, float(-gaps.min(initial=0.0))) or np.inf
+        return max(moved, float(abs(gaps[abs(gaps) <= reach]).max(initial=0.0)))
 
     def _moved(self, load: LoadCase) -> float:
         """max |f_i|/k_ii in the unit of displacements at contacts, mm."""
@@ -95,10 +102,10 @@ class Units:
         """The load case in these units."""
         if self.unchanged:
             return load
-        f, g, energy = self.D * load.f / self.U, self.R * load.g / self.U, self.U**2
+        scaled = {"f": self.D * load.f / self.U, "g": self.R * load.g / self.U}
         if isinstance(load, DualLoadCase):
-            return read_only(DualLoadCase(f, g, self.R * load.p / self.U, energy=energy))
-        return read_only(LoadCase(f, g, energy=energy))
+            scaled["p"] = self.R * load.p / self.U
+        return read_only(replace(load, **scaled, energy=self.U**2, length=self.length))
 
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector, Vector, Vector | None]:
         """λ, gaps and x of a warm start, in these units."""

@@ -25,6 +25,7 @@ from problems.forms.dependence import is_dependent, refuse_dependent
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.input.user_matrices import SMALL
 from problems.reporter import SILENT, Reporter
+from problems.stiffness import Vector, balanced_units
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
 
@@ -61,7 +62,13 @@ class SuperelementModel:
     @cached_property
     def dependent(self) -> bool:
         """Whether contacts depend on one another, as where three parts meet at one place."""
-        return is_dependent(self.A)
+        return is_dependent(self.A, self._units)
+
+    @property
+    def _units(self) -> Vector:
+        """The units (n,) in which K is balanced."""
+        parts = [part.stiffness.diagonal() for part in self.joint.parts]
+        return balanced_units(np.concatenate(parts) + self.springs.added.diagonal())
 
     @cached_property
     def springs(self) -> Springs:
@@ -92,7 +99,7 @@ class SuperelementModel:
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K with dense blocks. Raises InputError if contacts depend on one another."""
-        refuse_dependent(self.A, self.scene.source_of("A"), self.joint.contact_name)
+        refuse_dependent(self.A, self._units, self.scene.source_of("A"), self.joint.contact_name)
         start = time.perf_counter()
         matrices = [part.stiffness for part in self.joint.parts]
         blocks = [K.toarray(order="F") if sp.issparse(K) else K for K in matrices]

@@ -22,11 +22,11 @@ SIGN_UNCERTAINTY = 1e-5  # of |y_C| where a change starts: smaller values have n
 
 @dataclass(frozen=True)
 class TrialSolution:
-    """λ (m,) N, zero off the set, y (m,) mm, and the estimated rounding error on the active set, mm."""
+    """λ (m,) N, zero off the set, y (m,) mm, and the estimated rounding error, mm, of all or of each."""
 
     lam: Vector
     y: Vector
-    rounding: float
+    rounding: float | Vector
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class PivotingResult:
     creeps: bool
 
 
-def wrong_signs(C: Mask, trial: TrialSolution, compliance: Vector, tolerance: float) -> Mask:
+def wrong_signs(C: Mask, trial: TrialSolution, compliance: Vector, tolerance: float | Vector) -> Mask:
     """i in C with q_ii λ_i < −δ or off C with y_i < −δ, mm; δ = max(tolerance, 10 × observed rounding)."""
-    floor = max(tolerance, ROUNDING_FACTOR * trial.rounding)
+    floor = np.maximum(tolerance, ROUNDING_FACTOR * trial.rounding)
     return np.where(C, trial.lam * compliance, trial.y) < -floor
 
 
@@ -54,7 +54,7 @@ def block_pivoting(
     at: Callable[[Mask], TrialSolution],
     C: Mask,
     compliance: Vector,
-    tolerance: float,
+    tolerance: float | Vector,
     passes: int,
     patience: int | None = None,
 ) -> PivotingResult:
@@ -117,14 +117,15 @@ def forces_on(C: Mask, Q: Matrix, p: Vector) -> TrialSolution:
     """Q_CC λ_C = p_C, refined until |y_C| no longer halves."""
     rows = np.flatnonzero(C)
     factor = sla.cho_factor(Q[np.ix_(rows, rows)], check_finite=False)
-    best = TrialSolution(np.zeros(len(p)), -p, float(abs(p[rows]).max(initial=0.0)))
-    while best.rounding > rounding_of(p, best.y):
+    best, previous = TrialSolution(np.zeros(len(p)), -p, 0.0), float(abs(p[rows]).max(initial=0.0))
+    while (abs(best.y) > rounding_of(p, best.y))[rows].any():
         lam = best.lam.copy()
         lam[rows] -= sla.cho_solve(factor, best.y[rows], check_finite=False)
         y = product(Q, lam) - p
-        previous, missed = best.rounding, float(abs(y[rows]).max())
+        missed = float(abs(y[rows]).max())
         if missed < previous:
             best = TrialSolution(lam, y, missed)
         if not missed <= previous / 2:
             break
-    return replace(best, rounding=max(best.rounding, rounding_of(p, best.y)))
+        previous = missed
+    return replace(best, rounding=np.maximum(abs(best.y[rows]).max(initial=0.0), rounding_of(p, best.y)))

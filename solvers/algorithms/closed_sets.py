@@ -16,8 +16,7 @@ import numpy as np
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.forms.banded_inverse import Windows
 from problems.forms.closed_factor import ClosedFactor
-from problems.forms.compliance import DenseCompliance
-from problems.stiffness.dense_block import product
+from problems.forms.compliance import CountedProducts, DenseCompliance
 from solvers.base import DualLoadCase
 
 from .block_pivoting import TrialSolution, block_pivoting
@@ -32,10 +31,13 @@ UNCERTAINTY = 1e-9  # of |y_C| where a change starts: rounding
 
 
 class ClosedSets:
-    """Q (m, m) mm/N by columns. nodes : (m, 2) coordinates of the contacts, mm, if they are known."""
+    """Q (m, m) mm/N by columns. nodes : (m, 2) coordinates of the contacts, mm, if they are known.
+
+    products : with Q.
+    """
 
     def __init__(self, Q: Matrix, nodes: Matrix | None = None) -> None:
-        self.Q, self.nodes = Q, nodes
+        self.Q, self.nodes, self.products = Q, nodes, CountedProducts(DenseCompliance(Q))
         self.begin()
 
     def begin(self) -> None:
@@ -46,10 +48,10 @@ class ClosedSets:
         """λ⁺ and y⁺ of the set C, vectors in the order of Q. start : the point (λ, y), its rounding |y_C|."""
         change, y = np.where(C, 0.0, -start.lam), start.y
         if change.any():
-            y = y + product(self.Q, change)
+            y = y + self.products @ change
         closing = self.factor.solve(C, -y)
         lam = np.where(C, start.lam + closing, 0.0)
-        y = np.where(C, 0.0, y + product(self.Q, closing))
+        y = np.where(C, 0.0, y + self.products @ closing)
         return TrialSolution(lam, y, UNCERTAINTY * start.rounding)
 
     def first_set(self, load: DualLoadCase) -> Mask:
@@ -67,7 +69,7 @@ class ClosedSets:
         """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took."""
         system, diagonal = Direct(self.Q), np.diag(self.Q)
         glued = system.solve(YIELDING * diagonal, load.p, 0.0, 0).v
-        return interior_set(DenseCompliance(self.Q), system, diagonal, load.p, glued)
+        return interior_set(self.products, system, diagonal, load.p, glued)
 
 
 def _solved(Q: Matrix, p: Vector, C: Mask) -> Mask:

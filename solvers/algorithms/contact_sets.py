@@ -29,7 +29,7 @@ import numpy as np
 
 from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
-from problems.forms.compliance import ComplianceProducts
+from problems.forms.compliance import ComplianceProducts, CountedProducts
 from problems.forms.prepared import EPS, Prepared
 from problems.forms.sprung_stiffness import SprungStiffness
 from solvers.base import DualLoadCase
@@ -99,12 +99,14 @@ def yielding_set(M: BandedInverse, compliance: Vector, start: TrialSolution) -> 
 class ContactSprings:
     """Factorisations of K with springs at closed contacts, in place of Q⁻¹; vectors in the order of A.
 
-    stiffest : the largest stiffness of an unknown at a contact, N/mm. rho : that of the springs, N/mm.
+    products : with Q. stiffest : the largest stiffness of an unknown at a contact, N/mm. rho : that of the
+    springs, N/mm.
     """
 
     def __init__(self, prepared: Prepared) -> None:
         assembly = prepared.assembly
-        self.compliance, self.A = ComplianceProducts(assembly.K, assembly.A), assembly.A
+        compliance = ComplianceProducts(assembly.K, assembly.A)
+        self.products, self.A, self.At = CountedProducts(compliance), assembly.A, compliance.At
         self.diagonal = prepared.approximate_inverse.diagonal
         self.sprung = SprungStiffness(assembly.K.matrix, self.A, assembly.nodes)
         stiffest = float(assembly.K.diagonal[self.A.indices].max(initial=0.0))
@@ -116,7 +118,7 @@ class ContactSprings:
 
     def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
         """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
-        A, At, lam, y, rho = self.A, self.compliance.At, start.lam, start.y, self.rho
+        A, At, lam, y, rho = self.A, self.At, start.lam, start.y, self.rho
         inverse, change = self.sprung.factor(np.where(C, rho, 0.0)), np.where(C, 0.0, -lam)
         closed = At @ inverse(A @ np.where(C, rho * y, lam))
         step = r = np.where(C, closed - y, 0.0)
@@ -144,16 +146,16 @@ class ContactSprings:
         C = overlap > 0
         if not C.any():
             return C
-        rho = float(overlap @ overlap / (overlap @ (self.compliance @ overlap)))
+        rho = float(overlap @ overlap / (overlap @ (self.products @ overlap)))
         while rho < self.stiffest and C.any():
             x = self.sprung.factor(np.where(C, rho, 0.0))(load.f + A @ np.where(C, rho * load.g, 0.0))
-            C, rho = self.compliance.At @ x > load.g, GROWTH * rho
+            C, rho = self.At @ x > load.g, GROWTH * rho
         return C
 
     def interior_set(self, load: DualLoadCase) -> tuple[Mask, Vector, int]:
         """The closed contacts of an interior point, (m,), its λ (m,), and the factorisations that it took."""
         if not (load.p > 0).any():
             return load.p > 0, np.zeros_like(load.p), 0
-        system = Sprung(self.compliance, self.sprung, self.rho)
+        system = Sprung(self.products, self.At, self.sprung, self.rho)
         system.take(np.zeros_like(load.p))
-        return interior_set(self.compliance, system, self.diagonal, load.p, system.near(load.p))
+        return interior_set(self.products, system, self.diagonal, load.p, system.near(load.p))

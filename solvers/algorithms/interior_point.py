@@ -47,14 +47,13 @@ class Point:
     def mu(self) -> float:
         return float(self.lam @ self.y) / len(self.lam)
 
-    @property
-    def infeasibility(self) -> float:
-        """The larger of the overlap max(p − Qλ) and the force-weighted mean λᵀ|s1| / Σλ, mm.
+    def infeasibility(self, unit: float | Vector = 1.0) -> float:
+        """The larger of the overlap max(p − Qλ) and the force-weighted mean λᵀ|s1| / Σλ, in mm or units (m,).
 
         At an open gap λ → 0, and s1 does not matter as long as the gap stays open.
         """
-        overlap = float((-self.gap).max())
-        return max(overlap, float(self.lam @ abs(self.s1)) / float(self.lam.sum()))
+        overlap = float((-self.gap / unit).max())
+        return max(overlap, float(self.lam @ (abs(self.s1) / unit)) / float(self.lam.sum()))
 
 
 @dataclass

@@ -16,9 +16,10 @@ glued by springs ρ, (Q + I/ρ) λ = p, and v the largest overlap max p,
 """
 
 import numpy as np
+import scipy.sparse as sp
 
 from problems.forms.assembly import Mask, Vector
-from problems.forms.compliance import Compliance, ComplianceProducts
+from problems.forms.compliance import Compliance
 from problems.forms.sprung_stiffness import SprungStiffness
 
 from .interior_point import NewtonSteps, mehrotra
@@ -33,8 +34,8 @@ SMALLEST = 1e-15  # of the first μ: further steps are rounding
 class Sprung(NewtonSystem):
     """Conjugate gradients preconditioned by K with springs. rho : the stiffest, N/mm."""
 
-    def __init__(self, compliance: ComplianceProducts, sprung: SprungStiffness, rho: float) -> None:
-        self.compliance, self.sprung, self.rho = compliance, sprung, rho
+    def __init__(self, products: Compliance, At: sp.csr_array, sprung: SprungStiffness, rho: float) -> None:
+        self.products, self.At, self.sprung, self.rho = products, At, sprung, rho
         self.begin()
 
     def begin(self) -> None:
@@ -55,11 +56,11 @@ class Sprung(NewtonSystem):
 
     def near(self, b: Vector) -> Vector:
         """About (Q + D)⁻¹ b."""
-        A, At, rho = self.sprung.A, self.compliance.At, self.springs
+        A, At, rho = self.sprung.A, self.At, self.springs
         return rho * (b - At @ self.inverse(A @ (rho * b)))
 
     def times_H(self, v: Vector) -> Vector:
-        return self.compliance @ v + self.D * v
+        return self.products @ v + self.D * v
 
 
 def interior_set(

@@ -24,7 +24,8 @@ contacts (`contact_sets.yielding_set`), whose edges move further, or that of an 
 than further sets, so the limit on the sets of a sweep grows from sweep to sweep.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -33,7 +34,7 @@ import numpy as np
 from problems.forms.assembly import Mask, Vector
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, DualLoadCase, DualStart, Status
-from solvers.kkt import EPS, dual_answer, kkt_residual, largest_rounding, rounding_of
+from solvers.kkt import EPS, dual_answer, is_small, kkt_errors, rounding_bound, rounding_of
 
 from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
 from .closed_sets import ClosedSets
@@ -57,7 +58,7 @@ class Case:
     last_step : the last step and Q times it, if it left the set unchanged. residual : max(|y_C|, max(−y)).
     stalled : sweeps in succession that did not halve it. settled : whether every sign is right and the
     residual small enough. doubt : a bound of the rounding that y has accumulated since it was last computed
-    from λ, mm; infinite if y is not known.
+    from λ, mm, of each contact; infinite if y is not known. products : with Q, not with parts of it.
     """
 
     load: DualLoadCase
@@ -66,11 +67,12 @@ class Case:
     factor: OpenFactor | None = None
     last_step: tuple[Vector, Vector] | None = None
     residual: float = np.inf
-    doubt: float = np.inf
+    doubt: float | Vector = np.inf
     stalled: int = 0
     settled: bool = False
     sweeps: int = 0
     sets: int = 0
+    products: int = 0
 
 
 @dataclass
@@ -81,9 +83,10 @@ class Sweeps:
     order. last : the cases solved last, from which the next ones start. most : the limit on sweeps. log :
     takes the figures of each sweep.
 
-    A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ), ρ the rounding of
-    Qλ − p (`kkt.largest_rounding`), and r = max(|y_C|, max(−y)) is at most 0.02 tolerance; or does not halve
-    any more and is at most max(tolerance, 10ρ), or has not for three sweeps and is at most 1e-8 mm.
+    A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ_i), ρ the rounding of
+    Qλ − p (`kkt.rounding_bound`), and |y_i| on C and −y_i off it are at most 0.02 tolerance; or at most
+    max(tolerance, 10ρ_i) where the largest does not halve any more, or 1e-8 mm where it has not for three
+    sweeps.
     """
 
     prepared: Prepared
@@ -119,8 +122,9 @@ class Sweeps:
         """The cases of several loads, solved together. starts : a solved case for each load; by default all
         start from the solution of the first load.
         """
-        starts = starts or [self.solved(loads[0], tolerance)] * len(loads)
-        cases = self._sweep(self._begun(starts, loads), tolerance)
+        first = [] if starts else [self.solved(loads[0], tolerance)]
+        cases = self._sweep(self._begun(starts or first * len(loads), loads), tolerance)
+        cases[0].products += sum(case.products for case in first)
         for case in cases:
             case.factor = None  # as large as M for each; the next cases have other sets
         return cases
@@ -134,7 +138,8 @@ class Sweeps:
             zero = np.zeros(len(order))
             nothing = Case(load - load, zero > 0, TrialSolution(zero, zero, 0.0), doubt=0.0)
             (case,) = self._begun([nothing], [load])
-            case.C = case.C | (case.trial.y < 0) if self.M is not None else self.sets.first_set(load)
+            with self._counted(case):
+                case.C = case.C | (case.trial.y < 0) if self.M is not None else self.sets.first_set(load)
         else:
             lam, y = start.lam[order], start.gap[order]
             solved = Case(start.load, self.compliance * lam > y, TrialSolution(lam, y, 0.0))
@@ -143,22 +148,31 @@ class Sweeps:
             case.C = C[order]
         return self._sweep([case], tolerance)[0]
 
-    def answer(self, case: Case, tolerance: float) -> Answer:
-        """The answer of a solved case. Iterations are products with Q, inner iterations sets tried with M.
+    @contextmanager
+    def _counted(self, case: Case) -> Iterator[None]:
+        """Count the products with Q of the sets meanwhile."""
+        before = self.sets.products.made if self.M is None else 0
+        yield
+        case.products += self.sets.products.made - before if self.M is None else 0
 
-        "solved" if r = max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm. y is
-        recomputed from λ if r + doubt exceeds the tolerance, or if a force was below zero.
+    def answer(self, case: Case, tolerance: float) -> Answer:
+        """The answer of a solved case. Iterations are sweeps, inner iterations sets tried with M; details
+        count the products with Q.
+
+        "solved" if the errors, −y and |y| where λ > 0, are at most max(tolerance, `kkt.rounding_bound`) mm. y
+        is recomputed from λ if they and `doubt` exceed the tolerance, or if a force was below zero.
         """
         lam, y = self.vectors(case)
-        residual = kkt_residual(lam, y) + case.doubt
-        if residual > tolerance or (case.trial.lam < 0).any():
-            y = self.gaps(lam[:, None], [case.load])[:, 0]
-            residual = kkt_residual(lam, y)
-        enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
-        limit = "" if case.settled else f"{self.most} products"
+        errors = kkt_errors(lam, y)
+        errors[self.order] += case.doubt
+        if (errors > tolerance).any() or (case.trial.lam < 0).any():
+            errors = kkt_errors(lam, self.gaps(lam[:, None], [case.load])[:, 0])
+            case.products += 1
+        enough = is_small(errors, tolerance, rounding_bound(self.diagonal, case.load.p, lam))
+        limit = "" if case.settled else f"{self.most} sweeps"
         status: Status = "solved" if enough else "inaccurate"
-        details, counts = {"closed": int(case.C.sum())}, (case.sweeps, case.sets)
-        return dual_answer(status, lam, residual, details, counts, limit)
+        details, counts = {"closed": int(case.C.sum()), "products": case.products}, (case.sweeps, case.sets)
+        return dual_answer(status, lam, float(errors.max(initial=0.0)), details, counts, limit)
 
     def vectors(self, case: Case) -> tuple[Vector, Vector]:
         """λ ≥ 0 (m,) N and y (m,) mm, in the order of A."""
@@ -184,8 +198,8 @@ class Sweeps:
             C = np.where(force == 0, case.C, lam > 0)
             factor = case.factor and replace(case.factor, room=None)
             trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
-            doubt = case.doubt + largest_rounding(self.compliance, load.p[self.order], lam)
-            begun.append(Case(load, C, trial, factor, doubt=doubt))
+            doubt = case.doubt + rounding_bound(self.compliance, load.p[self.order], lam)
+            begun.append(Case(load, C, trial, factor, doubt=doubt, products=int(k in some)))
         return begun
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
@@ -196,9 +210,11 @@ class Sweeps:
         for _ in range(self.most):
             steps = []  # λ, whether the set is unchanged, and whether y follows by its change
             for case in active:
-                lam, same = self._step(case)
-                rounding = largest_rounding(self.compliance, case.load.p[order], lam)
-                steps.append((case, lam, same, same and case.doubt <= SMALL * rounding))
+                with self._counted(case):
+                    lam, same = self._step(case)
+                case.products += 1  # of the gaps below
+                rounding = rounding_bound(self.compliance, case.load.p[order], lam)
+                steps.append((case, lam, same, same and bool((case.doubt <= SMALL * rounding).all())))
             moved = np.empty((len(order), len(active)), order="F")
             moved[order] = np.column_stack(
                 [lam - case.trial.lam if change else lam for case, lam, _, change in steps]
@@ -240,6 +256,7 @@ class Sweeps:
                 C, lam, factorisations = self.sets.interior_set(case.load)
                 C, lam = C[order], np.where(C, lam, 0.0)
                 y = self.gaps(lam[:, None], [case.load])[order, 0]
+                case.products += 1
                 case.trial = TrialSolution(lam[order], y, float(abs(y[C]).max(initial=0.0)))
                 at = partial(self.sets.set, case.trial)
             else:
@@ -254,14 +271,14 @@ class Sweeps:
             lam = lam - ((lam - case.trial.lam) @ change / (step @ change)) * step
         return lam, unchanged
 
-    def _floor(self, case: Case, trial: TrialSolution) -> float:
+    def _floor(self, case: Case, trial: TrialSolution) -> Vector:
         """The rounding of y, mm, below which no sign is wrong: a bound; for products with K⁻¹ an estimate, as
         the bound adds the forces of contacts that are far from each other.
         """
         p = case.load.p[self.order]
         if self.M is None and not self.prepared.assembly.K.dense:
             return rounding_of(p, trial.y)
-        return largest_rounding(self.compliance, p, trial.lam)
+        return rounding_bound(self.compliance, p, trial.lam)
 
     def _take(self, case: Case, lam: Vector, y: Vector, unchanged: bool, tolerance: float) -> None:
         """Take λ and y, or a part of the step to them, and decide whether the case is settled."""
@@ -270,22 +287,23 @@ class Sweeps:
         case.last_step = None
         if unchanged and curvature > 0:
             share = float(np.clip(-slope / curvature, *STEP_RANGE))
-            case.doubt = max(case.doubt, 4 * EPS * float(abs(case.trial.y).max()))
+            case.doubt = np.maximum(case.doubt, 4 * EPS * abs(case.trial.y))
             lam, y = case.trial.lam + share * step, case.trial.y + share * change
             case.last_step = step, change
         missed = float(abs(y[case.C]).max(initial=0.0))
-        residual = max(missed, float(-y.min(initial=0.0)))
+        errors = np.where(case.C, abs(y), -y)
+        residual = float(errors.max(initial=0.0))
         case.stalled = case.stalled + 1 if residual > case.residual / 2 else 0
         case.trial, case.sweeps = TrialSolution(lam, y, missed), case.sweeps + 1
         case.residual = residual
         floor = self._floor(case, case.trial)
         right = not wrong_signs(case.C, case.trial, self.compliance, floor).any()
-        enough = TARGET * tolerance
+        enough, rounding = TARGET * tolerance, np.zeros_like(y)
         if case.stalled:
-            enough = max(tolerance, ROUNDING_FACTOR * floor)
+            enough, rounding = tolerance, ROUNDING_FACTOR * floor
         if case.stalled >= STALLED:
-            enough = max(enough, STALLED_MM)
-        case.settled = right and residual <= enough
+            enough = max(enough, STALLED_MM / case.load.length)
+        case.settled = right and is_small(errors, enough, rounding)
 
 
 def _distance(load: DualLoadCase, case: Case) -> float:

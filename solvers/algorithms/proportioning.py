@@ -30,7 +30,7 @@ import numpy as np
 
 from problems.forms.assembly import Mask, Vector
 from problems.forms.compliance import Compliance
-from solvers.kkt import kkt_residual, rounding_of
+from solvers.kkt import is_small, kkt_errors, kkt_residual, rounding_bound
 
 from .block_pivoting import TrialSolution, block_pivoting
 from .contact_sets import OpenFactor, banded_set
@@ -113,16 +113,15 @@ class Proportioning:
     last_step: tuple[Vector, Vector, Mask] | None = None
 
     def solve(self, tolerance: float, max_products: int, log: Callable[..., None]) -> bool:
-        """Steps until the KKT residual is at most max(tolerance/10, rounding) mm or rounding prevents more.
+        """Steps until the KKT errors are at most max(tolerance/10, rounding) mm or rounding prevents more.
 
         False if `max_products` were not enough. λ and y then have the smallest residual that was recomputed.
         log : takes the figures of each recomputation.
         """
         best, since, stalled = (np.inf, self.lam, self.y), 0, 0
         while True:
-            target = max(RESIDUAL_TARGET * tolerance, rounding_of(self.p, self.y))
             enough = self.products >= max_products
-            moved = not enough and kkt_residual(self.lam, self.y) > target and self._step()
+            moved = not enough and not self.is_optimal(RESIDUAL_TARGET * tolerance) and self._step()
             since += 1
             if moved and since < RECOMPUTED:
                 continue
@@ -132,10 +131,16 @@ class Proportioning:
             log(products=self.products, residual_mm=residual)
             stalled = 0 if moved or residual < best[0] / 2 else stalled + 1
             best = min(best, (residual, self.lam, self.y), key=lambda point: point[0])
-            done = residual <= target or stalled == STALLED or (stalled and residual <= tolerance)
+            done = stalled == STALLED or (stalled and residual <= tolerance)
+            done = done or self.is_optimal(RESIDUAL_TARGET * tolerance)
             if enough or done:
                 _, self.lam, self.y = best
                 return bool(done)
+
+    def is_optimal(self, tolerance: float) -> bool:
+        """Whether no error of λ and y is beyond the tolerance, mm, and its contact's rounding."""
+        rounding = rounding_bound(self.diagonal, self.p, self.lam)
+        return is_small(kkt_errors(self.lam, self.y), tolerance, rounding)
 
     def _step(self) -> bool:
         """Take a step; False if rounding lets no direction decrease the objective."""

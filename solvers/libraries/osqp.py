@@ -61,6 +61,7 @@ class Osqp(Library):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """OSQP.update and warm_start; the factors and the last ρ are kept."""
         _, library = ready
+        library.update_settings(eps_abs=self.settings.get("eps_abs", tolerance))
         (q, h), (z, multipliers) = state.vectors(load), state.start(start)
         library.update(q=q, **({} if h is None else {"u": h}))
         # OSQP's multipliers of lower bounds are negative.

@@ -10,7 +10,7 @@ import numpy as np
 import piqp
 import scipy.sparse as sp
 
-from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
+from solvers.adapter import Converted, Library, converted, is_sparse, set_absolute
 from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
 from solvers.options import apply
 
@@ -59,7 +59,8 @@ class Piqp(Library):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """PIQP's update of the vectors, with the preconditioner kept; it has no warm start."""
         q, h = state.vectors(load)
-        ready[1].settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
+        set_absolute(ready[1].settings, tolerance, load)
+        apply(ready[1].settings, self.settings)
         ready[1].update(c=q, **({} if h is None else {"h_u": h}))
         return ready
 

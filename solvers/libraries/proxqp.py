@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from proxsuite import proxqp
 
-from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
+from solvers.adapter import Converted, Library, converted, is_sparse, set_absolute
 from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
 from solvers.options import apply
 
@@ -74,7 +74,8 @@ class ProxQp(Library):
         """
         _, library, _ = ready
         q, h = state.vectors(load)
-        library.settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
+        set_absolute(library.settings, tolerance, load)
+        apply(library.settings, self.settings)
         if h is None:
             library.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
             library.update(g=q)

@@ -39,8 +39,8 @@ class GoldfarbIdnani(Method):
     """Goldfarb–Idnani with Powell's safeguards.
 
     Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) beyond rounding. In
-    the dual form the answer λ ≥ 0, y = Qλ − p is then checked: "solved" if max(max(−y), max_{λ>0} |y|) ≤
-    max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are changes of the active set. If
+    the dual form the answer λ ≥ 0, y = Qλ − p is then checked: "solved" if −y, and |y| where λ > 0, are at
+    most max(tolerance, 4ε(|p| + |Q|λ)) mm, else "inaccurate". Iterations are changes of the active set. If
     rounding in Q⁻¹ leaves it inaccurate, or in the primal form an open contact has a slack barely below zero,
     block principal pivoting continues from its set (details: finishing_sets).
     """

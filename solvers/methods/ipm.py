@@ -28,7 +28,7 @@ from solvers.algorithms.interior_point import (
 from solvers.algorithms.newton_system import NewtonSystem
 from solvers.algorithms.preconditioner import SYSTEMS, OpenLast
 from solvers.base import Answer, DualLoadCase, Problem, Status
-from solvers.kkt import largest_rounding
+from solvers.kkt import rounding_bound
 from solvers.method import Method, State
 from solvers.options import one_of, require
 
@@ -63,10 +63,10 @@ class Ipm(Method):
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ 1e-3 √ε_μ mm with s1 = y − (Qλ − p).
     ε_μ is the tolerance, in N·mm. The session passes tolerance/ℓ; divided again by ℓ = √load.energy it is an
     energy in scaled units. The paper tests μ alone, because it solves its systems exactly.
-    Feasibility is not required below the rounding of Qλ − p, at most 4ε max(|p| + |Q|λ) with
-    |q_ij| ≤ √(q_ii q_jj). Each contact must also be decided: min(y_i, q_ii λ_i) is at most that rounding or
-    √(0.1 mm/N · ε_μ), because a contact that touches without a force is off by √(μ q_ii). The root mean
-    square of √(q_ii λ_i y_i) has the same limit; ε_μ implies it if q_ii ≤ 0.1 mm/N.
+    Feasibility is not required below the rounding of each (Qλ − p)_i (`kkt.rounding_bound`). Each contact
+    must also be decided: min(y_i, q_ii λ_i) is at most that rounding or √(0.1 mm/N · ε_μ), because a contact
+    that touches without a force is off by √(μ q_ii). The root mean square of √(q_ii λ_i y_i) has the same
+    limit; ε_μ implies it if q_ii ≤ 0.1 mm/N.
 
     The iteration stalls if the error of inexact systems in s1 outlasts y, or if a step ended too close to the
     boundary. It then restarts with a smaller cg_tolerance and theta (details: restarts).
@@ -131,7 +131,7 @@ class Ipm(Method):
             details["restarts"] = restart
         if newton.unconverged:
             details["cg_unconverged"] = newton.unconverged
-        details |= {"mu": point.mu, "infeasibility": point.infeasibility}
+        details |= {"mu": point.mu, "infeasibility": point.infeasibility()}
         details |= {"factorisations": system.factorisations} | ({"cause": cause} if cause else {})
         return Answer(
             status,
@@ -154,7 +154,7 @@ class Ipm(Method):
         most = self.most(MAX_ITERATIONS)
         for _ in range(most):  # step 4
             measure = self._measure(newton, point, tolerance)
-            self.log(mu=point.mu, infeasibility=point.infeasibility, to_tolerance=measure)
+            self.log(mu=point.mu, infeasibility=point.infeasibility(), to_tolerance=measure)
             if measure <= 1:
                 return "solved", "", point
             stalled = 0 if measure < smallest else stalled + 1
@@ -178,11 +178,12 @@ class Ipm(Method):
     def _measure(self, newton: NewtonSteps, point: Point, tolerance: float) -> float:
         """The largest ratio of a quantity of the stopping rule to what it may be."""
         force, y = np.diag(newton.system.Q) * point.lam, point.y
-        rounding = largest_rounding(np.diag(newton.system.Q), newton.p, point.lam)
-        undecided = float(np.minimum(y, force).max())
-        spread = float(np.sqrt((force * y).mean()))
+        rounding = rounding_bound(np.diag(newton.system.Q), newton.p, point.lam)
+        feasible = np.maximum(FEASIBILITY * np.sqrt(tolerance), rounding)
+        decided = np.maximum(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding)
         return max(
             point.mu / tolerance,
-            point.infeasibility / max(FEASIBILITY * np.sqrt(tolerance), rounding),
-            max(undecided, spread) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
+            point.infeasibility(feasible),
+            float((np.minimum(y, force) / decided).max()),
+            float(np.sqrt((force * y / decided**2).mean())),
         )

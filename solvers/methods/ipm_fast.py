@@ -40,7 +40,7 @@ class FastIpm(Method):
     of its initial value and at most m/4 contacts are undecided, or when the interior point ends; its status
     is the answer's. The interior point ends when the natural residual max|min(q_ii λ_i, (Qλ − p)_i)| is at
     most the tolerance, mm, or has not decreased for 10 iterations. Iterations are Newton matrices, inner
-    iterations the finish's products with Q.
+    iterations the finish's sweeps.
     """
 
     def state(self, problem: Problem) -> _State:
@@ -72,7 +72,7 @@ class FastIpm(Method):
             if done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p)):
                 case = ready.finish.solved(load, tolerance, C=ratio > 1)
                 answer = ready.finish.answer(case, tolerance)
-                details |= answer.details
+                details |= {name: value for name, value in answer.details.items() if name != "products"}
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             point = mehrotra(newton, point)
             if not np.isfinite(point.mu):

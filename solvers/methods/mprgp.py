@@ -18,7 +18,7 @@ from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
 from solvers.base import Answer, LoadCase, Problem, Status, failed
-from solvers.kkt import dual_answer, kkt_residual, largest_rounding, with_x
+from solvers.kkt import dual_answer, kkt_residual, with_x
 from solvers.method import Method, State, first_point
 from solvers.options import one_of, require
 
@@ -40,11 +40,11 @@ class _State(State):
 class Mprgp(Method):
     """MPRGP with Γ = 1, from λ = 0 or a warm start.
 
-    Stops when r = max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with a recomputed
-    y = Qλ − p; or when one recomputation has not halved an r below the tolerance, or five an r above it.
-    "solved" if r is then at most max(tolerance, `kkt.largest_rounding`) mm, else "inaccurate".
-    Iterations are steps, inner iterations contact sets tried with M; details count the products with Q per
-    load case. In the sparse form the status is that of the refined x (solvers/kkt.py).
+    Stops when the errors, −y and |y| where λ > 0, are at most max(tolerance/10, `kkt.rounding_bound`) mm with
+    a recomputed y = Qλ − p; or when one recomputation has not halved the largest of them, if that is below
+    the tolerance, or five have not. "solved" if they are then at most max(tolerance, `kkt.rounding_bound`)
+    mm, else "inaccurate". Iterations are steps, inner iterations contact sets tried with M; details count the
+    products with Q per load case. In the sparse form the status is that of the refined x (solvers/kkt.py).
 
     Options
     -------
@@ -93,8 +93,7 @@ class Mprgp(Method):
         most = self.most(MAX_PRODUCTS)
         enough = case.solve(tolerance, most, self.log)
         residual = kkt_residual(case.lam, case.y)
-        solved = residual <= max(tolerance, largest_rounding(ready.diagonal, dual.p, case.lam))
-        status: Status = "solved" if solved else "inaccurate"
+        status: Status = "solved" if case.is_optimal(tolerance) else "inaccurate"
         details = {"products": case.products, "steps": case.steps}
         counts, limit = (sum(case.steps.values()), metric.sets), "" if enough else f"{most} products"
         answer = dual_answer(status, case.lam, residual, details, counts, limit)

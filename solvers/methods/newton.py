@@ -11,7 +11,7 @@ are solved with a factor of Q_CC (closed_sets.py), in the sparse form with one o
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from solvers.algorithms.newton_sweeps import MAX_SWEEPS, Sweeps
 from solvers.base import Answer, Batch, LoadCase, Problem
@@ -30,15 +30,14 @@ class _State(State):
             answers = [sweeps.answer(sweeps.solved(cases[0], tolerance, self.dual_start), tolerance)]
         else:
             answers = sweeps(cases, tolerance)
-        answers = [replace(a, details=a.details | {"products": a.iterations}) for a in answers]
         return with_x(self.problem, answers, loads, tolerance)
 
 
 class ActiveSetNewton(Method):
     """Active-set Newton, from the forces of the fasteners or a warm start; it stops by the rule of `Sweeps`.
 
-    Iterations are products with Q, inner iterations contact sets tried with M. `Sweeps.answer` defines
-    "solved"; in the sparse form the refined x decides (solvers/kkt.py).
+    Iterations are sweeps, inner iterations contact sets tried with M; details count the products with Q.
+    `Sweeps.answer` defines "solved"; in the sparse form the refined x decides (solvers/kkt.py).
     """
 
     forms = ("dual", "sparse")

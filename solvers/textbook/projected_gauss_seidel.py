@@ -16,7 +16,7 @@ from scipy.linalg import blas
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness.dense_block import product
 from solvers.base import Answer, DualLoadCase
-from solvers.kkt import dual_answer, kkt_residual, kkt_status, rounding_of
+from solvers.kkt import dual_answer, is_small, kkt_errors, kkt_residual, kkt_status, rounding_bound
 from solvers.method import Method, State, first_point
 from solvers.options import require
 
@@ -29,7 +29,8 @@ SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual after so many checks; a slow
 class ProjectedGaussSeidel(Method):
     """Projected Gauss–Seidel, from λ = 0 or a warm start.
 
-    "solved" if max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Qλ|)) mm, tested every ten sweeps;
+    Stops when −y, and |y| where λ > 0, are at most max(tolerance, `kkt.rounding_bound`) mm, tested every ten
+    sweeps; "solved" if they are at most max(tolerance, 4ε(|p| + |Q|λ)) mm;
     "inaccurate" if a thousand sweeps have not halved it. Iterations are sweeps; the details count a sweep as
     a product with Q.
 
@@ -54,7 +55,7 @@ class ProjectedGaussSeidel(Method):
         while True:
             reached.append(kkt_residual(lam, y))
             self.log(sweeps=sweeps, residual_mm=reached[-1])
-            if reached[-1] <= max(tolerance, rounding_of(p, y)):
+            if is_small(kkt_errors(lam, y), tolerance, rounding_bound(np.diag(Q), p, lam)):
                 break
             if sweeps >= most:
                 limit = f"{most} sweeps"

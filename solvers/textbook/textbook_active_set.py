@@ -23,8 +23,8 @@ MAX_SETS = 100
 class TextbookActiveSet(Method):
     """Takes no options. Starts from p > 0, or from the closed contacts of a warm start.
 
-    Ends when no sign is wrong by more than the tolerance (λ in N, y in mm): "solved" if max(max(−y),
-    max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate"; or after a hundred sets.
+    Ends when no sign is wrong by more than the tolerance (λ in N, y in mm): "solved" if −y, and |y| where
+    λ > 0, are at most max(tolerance, 4ε(|p| + |Q|λ)) mm, else "inaccurate"; or after a hundred sets.
     Iterations are the sets, each factored anew.
     """
 

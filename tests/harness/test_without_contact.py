@@ -11,6 +11,7 @@ from commands import harness
 from matrix_files import PATHS, files_of
 from rich.console import Console
 
+from harness import LoadCase, own_matrices, solve, solve_series
 from harness.scene.export import export
 from harness.scene.import_files import import_matrices
 from harness.scene.solve import solve_into
@@ -88,6 +89,21 @@ def test_validate_says_so_and_there_is_nothing_to_measure(path: Path) -> None:
     done = harness("run", "--scene", path, "--solver", "gi", "--out", path.parent / "run")
     assert done.exit_code == 2
     assert "there is no quadratic program to measure" in done.output
+
+
+@pytest.mark.parametrize("name", ["newton", "gi", "piqp"])
+def test_a_series_says_so_too(name: str) -> None:
+    scene = own_matrices([[1.0]], np.zeros((1, 0)), [1.0], [])
+    with pytest.raises(InputError, match="contacts = 0: at least one, else there is no quadratic program"):
+        list(solve_series(scene, [LoadCase(np.ones(1), np.zeros(0))], name))
+
+
+@pytest.mark.parametrize("A", [np.zeros((1, 0)), np.ones((1, 1))], ids=["without", "with contact"])
+@pytest.mark.filterwarnings("ignore:overflow encountered")
+def test_displacements_that_overflow_are_refused(A: np.ndarray) -> None:
+    scene = own_matrices([[1e-10]], A, [1e300], np.zeros(A.shape[1]))
+    with pytest.raises(InputError, match=r"largest \|f\| = 1e\+300: loads with finite displacements"):
+        solve(scene)
 
 
 @pytest.mark.parametrize("form", ["npz", "mtx"])

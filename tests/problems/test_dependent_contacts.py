@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from commands import harness
 
 from harness import LoadCase, own_matrices, solve_series
+from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.dependence import refuse_dependent
 
@@ -39,7 +40,7 @@ def grid(k: int) -> sp.csc_array:
 def column_of(A: sp.csc_array) -> int | None:
     """The contact that is refused."""
     try:
-        refuse_dependent(A, "A.mtx")
+        refuse_dependent(A, np.ones(A.shape[0]), "A.mtx")
     except InputError as error:
         (fault,) = error.faults
         assert (fault.where, str(fault.value)[:18]) == ("A.mtx", "dependent on A[:, ")
@@ -131,3 +132,20 @@ def test_contacts_that_the_rounding_of_Q_makes_dependent_are_said() -> None:
     (result,) = solve_series(scene, [load], form="dual")
     assert result.row["status"] == "failed"
     assert "Q is not positive definite" in result.row["message"]
+
+
+@pytest.mark.parametrize("bits", [0, 60])
+def test_the_units_of_the_unknowns_make_no_contact_dependent(bits: int) -> None:
+    """K = I and A = [[1, 1], [0, 1]] with x₂ in another unit; Q is [[1, 1], [1, 2]] in all."""
+    S = np.array([1.0, 2.0**-bits])
+    K, A = np.diag(S**2), S[:, None] * np.array([[1.0, 1.0], [0.0, 1.0]])
+    data = prepared(own_matrices(K, A, [1.0, 1.0], [0.0, 0.0]))
+    assert not data.assembly.dependent
+    np.testing.assert_array_equal(data.Q, [[1, 1], [1, 2]])
+
+
+def test_contacts_that_only_a_rigid_unknown_tells_apart_are_dependent() -> None:
+    """Q = [[1, 1], [1, 1 + 2⁻⁶⁰]] is singular in double precision, though A is [[1, 1], [0, 1]]."""
+    scene = own_matrices(np.diag([1.0, 2.0**60]), [[1.0, 1.0], [0.0, 1.0]], [1.0, 0.0], [0.5, 0.5])
+    with pytest.raises(InputError, match=r"A\[:, 1\] = 'dependent on A\[:, 0\]'"):
+        prepared(scene)

@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 import scipy.linalg as sla
+import scipy.sparse as sp
 from small_problems import make_load, make_prepared, solve_by_nnls
 
 from harness.verification.assess import assess
 from harness.verification.reference import best_of_candidates, proof_of
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 
 def test_the_residuals_are_those_of_the_judge() -> None:
@@ -40,3 +44,13 @@ def test_a_block_is_its_cases_one_by_one() -> None:
         known = best_of_candidates(prepared, case)
         assert abs(answer.x - known.x).max() <= answer.bound_mm + known.bound_mm
         assert answer.bound_mm < 1e-9
+
+
+def test_closed_contacts_whose_compliance_rounding_makes_singular_are_no_fault() -> None:
+    """K = diag(1, 10¹⁶), A = [[1, 1], [0, −1]]: Q is [[1, 1], [1, 1 + 10⁻¹⁶]], and λ = (¼, ¼), x₁ = ½."""
+    A = sp.csc_array(np.array([[1.0, 1.0], [0.0, -1.0]]))
+    prepared = Prepared(Assembly(Stiffness.of(np.diag([1.0, 1e16])), A))
+    load = LoadCase(np.array([1.0, 0.0]), np.array([0.5, 0.5]))
+    (answer,) = assess(proof_of(prepared), [load], [np.array([0.25, 0.25])], [None], 1e-8)
+    np.testing.assert_allclose(answer.x, [0.5, 0.0], atol=1e-15)
+    assert answer.bound_mm >= 0

@@ -57,6 +57,11 @@ def test_kkt_residual_within_rounding_is_solved() -> None:
         assert kkt_status(Q, p, lam, y, 0.0)[0] == status
 
 
+def test_kkt_residual_within_the_rounding_of_another_contact_is_not_solved() -> None:
+    Q, p, lam = np.eye(2), array(1.0, -1e30), array(0.0, 0.0)
+    assert kkt_status(Q, p, lam, Q @ lam - p, 1e-7) == ("inaccurate", 1.0)
+
+
 @pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array], ids=["dense", "sparse"])
 def test_reference_proves_each_part_by_its_own_eigenvalue(kind: Callable[[np.ndarray], Any]) -> None:
     """λmin of one part is a hundredth of that of the other, whatever the stiffness of each."""

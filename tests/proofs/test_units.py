@@ -8,7 +8,7 @@ import pytest
 import scipy.sparse as sp
 from sample_size import ASKED
 from small_problems import make_load, make_prepared, problem_in, solve_by_nnls
-from solver_forms import CASES, SLOW, TESTED, TOLERANCES
+from solver_forms import CASES, IN_HOUSE, SLOW, TESTED, TOLERANCES, WRITTEN_HERE
 
 from harness.solving.session import SolverSession
 from harness.verification.reference import reference
@@ -162,6 +162,9 @@ def test_the_duality_gap_may_have_as_many_newton_millimetres_as_the_tolerance_ha
     assert gap_tolerance(1e-10, scaled_load) == 1e-13  # rounding
     assert gap_tolerance(1e-300, scaled_load) == 1e-300  # asked for more than that
     assert gap_tolerance(1e-9, replace(scaled_load, energy=1e-6)) == 1e-9
+    larger = Units.of(given).of_loads([replace(load, f=2.0**12 * load.f, g=2.0**12 * load.g)])
+    assert larger.length > 1
+    assert gap_tolerance(1.0 / larger.length, larger.load(load)) == 1.0 / larger.U**2 > 1e-13
 
 
 # Answers.
@@ -212,6 +215,25 @@ def test_answers_do_not_depend_on_units(name: str, form: Form, bits: int) -> Non
     np.testing.assert_allclose(answers[0][0].lam, lam, rtol=0, atol=1e-3)
     if answers[0][0].x is not None:
         np.testing.assert_allclose(answers[0][0].x, x, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("far", [1e10, 1e30])
+@pytest.mark.parametrize(("name", "form"), [*IN_HOUSE, *((name, "dual") for name in WRITTEN_HERE)])
+def test_a_contact_out_of_reach_changes_no_answer(name: str, form: Form, far: float) -> None:
+    """All contacts that stay open are moved away: λ and x are those of the contacts as they were."""
+    data = make_prepared(2, 12, 3)
+    case, _ = make_load(3, data)
+    x, lam = solve_by_nnls(data, case)
+    moved = LoadCase(case.f, np.where(lam > 0, case.g, far))
+    assert 0 < np.count_nonzero(lam) < len(lam)
+    problem = problem_in(data, form)
+    (load,) = problem.loads([moved])
+    assert Units.of(problem).of_loads([load]).length == 1.0
+    answer = opened_session(name, problem, TOLERANCES[name]).cold(load)
+    assert answer.status == "solved" or (name, far) == ("ipm", 1e30)  # which starts from all gaps, and stalls
+    if answer.status == "solved":
+        np.testing.assert_allclose(answer.lam, lam, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(problem.recover([answer.lam], [answer.x], [load])[0], x, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize(

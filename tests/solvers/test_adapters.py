@@ -6,14 +6,16 @@ import piqp
 import pytest
 import qpsolvers
 import scipy.linalg as sla
+import scipy.sparse as sp
 from proxsuite import proxqp
 from small_problems import make_load, make_prepared, make_strips, problem_in, solve_by_nnls
-from solver_forms import TESTED
+from solver_forms import CASES, TESTED
 
 from harness.conformance.check import run
 from harness.solving.session import SolverSession
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 from solvers.adapter import clipped, dense, upper_triangle
 from solvers.base import DENSE_FORMS, FORMS, Answer, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
@@ -99,6 +101,35 @@ def test_settings_that_a_library_holds(name: str, form: Form) -> None:
         assert isinstance(library, piqp.SparseSolver if form == "sparse" else piqp.DenseSolver)
     if name == "proxqp":
         assert isinstance(library, proxqp.sparse.QP) is (form == "sparse")
+
+
+#: One contact, K = 100 N/mm: (f, g, x, λ) of a case in mm, and of one 10⁵ times as large.
+SMALL, LARGE = (50.0, 0.2, 0.2, 30.0), (5e6, 2e4, 2e4, 3e6)
+
+
+@pytest.mark.parametrize("cases", [(SMALL, LARGE), (LARGE, SMALL)], ids=["larger", "smaller"])
+@pytest.mark.parametrize(("name", "form"), CASES)
+def test_a_case_of_another_size_has_a_tolerance_of_its_own(name: str, form: Form, cases: Any) -> None:
+    """Solved after another case, it is as accurate as by itself; the unit of length changes between them."""
+    data = Prepared(Assembly(Stiffness.of(np.array([[100.0]])), sp.csc_array([[1.0]])))
+    problem = problem_in(data, form)
+    loads = problem.loads([LoadCase(np.array([f]), np.array([g])) for f, g, *_ in cases])
+    alone, series = (SolverSession(make_solver(name, {}), problem, 1e-7) for _ in range(2))
+    for session in (alone, series):
+        session.open()
+    first = series.next(loads[0], None)
+    length, wanted = series.units.length, alone.next(loads[1], None)
+    answer = series.next(loads[1], series.nearest(loads[1]))
+    assert first.status == "solved"
+    assert series.units.length == alone.units.length != length
+    assert answer.status == wanted.status
+    exact = cases[1][3]
+    assert abs(answer.lam[0] - exact) <= 2 * abs(wanted.lam[0] - exact) + 1e-5
+    if name in HELD:
+        library = series.ready[1]
+        settings = library.get_settings() if name == "clarabel" else library.settings
+        key = "tol_feas" if name == "clarabel" else "eps_abs"
+        assert getattr(settings, key) == 1e-7 / series.units.length
 
 
 @pytest.mark.parametrize("form", DENSE_FORMS)
@@ -217,6 +248,9 @@ def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
     assert np.abs(prepared.recover(polished.lam, case) - expected_x).max() > 1e-7
     assert polished.status == "inaccurate"
     assert plain.status == "solved"
+    modelled = solved("cvxpy", {}, prepared, load, 1e-9)  # polishing is CVXPY's default
+    assert np.abs(prepared.recover(modelled.lam, case) - expected_x).max() > 1e-7
+    assert modelled.status == "inaccurate"
 
 
 @pytest.mark.parametrize(

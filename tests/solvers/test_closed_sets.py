@@ -9,15 +9,18 @@ from small_problems import by_nnls, definite
 
 from harness.solving.session import answer_of
 from harness.verification.reference import proof_of
+from problems.forms import compliance
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase
 from problems.forms.closed_factor import ClosedFactor
 from problems.forms.prepared import Prepared, dual_alone
+from problems.forms.problem import in_form
 from problems.forms.sprung_stiffness import SprungStiffness
 from problems.ladders.rough import brick_stiffness
 from problems.stiffness.operator import Stiffness
 from solvers.algorithms.block_pivoting import TrialSolution
 from solvers.algorithms.closed_sets import ClosedSets
 from solvers.algorithms.newton_sweeps import Sweeps
+from solvers.base import WarmStart
 from solvers.registry import make_solver
 
 TOLERANCE = 1e-10
@@ -149,3 +152,34 @@ def test_solids_that_meet_on_a_face_are_solved_and_proven_with_q(monkeypatch: py
     assert 10 < np.count_nonzero(exact) < 54
     np.testing.assert_allclose(answer.lam, exact, atol=1e-9)
     assert proof_of(data).proven([load], [answer.lam], [answer.x], 1e-12)[0].bound_mm < 1e-12
+
+
+@pytest.mark.parametrize("decays", [True, False], ids=["with M", "without"])
+def test_the_products_that_are_told_are_those_made(decays: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of sweeps, sets, starts and checks, not of parts of Q; alone, from a solved case and together."""
+    size, made, original = 600, [], compliance.product
+    x, D = np.linspace(0, 1, size), np.diff(np.eye(size), 2, axis=0)
+    beam = np.linalg.inv(1e4 * D.T @ D + 1e-2 * np.eye(size))
+    Q = np.asfortranarray((beam + beam.T) / 2) if decays else definite(size, 5, 1e3)
+    p = 0.2 + np.cos(4 * np.pi * x) if decays else 30 * np.random.default_rng(5).standard_normal(size)
+    data = dual_alone(Q)
+    solver = make_solver("newton", {})
+    state = solver.prepare(in_form(data, "dual"))
+    assert (state.sweeps.M is not None) is decays
+
+    def counted(Q: np.ndarray, lam: np.ndarray) -> np.ndarray:
+        if len(Q) == size:
+            made.append(1 if lam.ndim == 1 else lam.shape[1])
+        return original(Q, lam)
+
+    monkeypatch.setattr(compliance, "product", counted)
+    loads = [DualLoadCase(0 * q, -q, q) for q in (p, np.roll(p, 80), np.roll(p, 160))]
+    answer = solver.solve(state, loads[0], TOLERANCE)
+    assert answer.details["products"] == sum(made) >= answer.iterations
+    made.clear()
+    start = WarmStart(loads[0], answer.lam, original(Q, answer.lam) - p)
+    warm = solver.solve(solver.update(state, state, loads[1], TOLERANCE, start), loads[1], TOLERANCE)
+    assert warm.details["products"] == sum(made) >= warm.iterations
+    made.clear()
+    together = solver.batched(state)(loads, TOLERANCE)
+    assert sum(one.details["products"] for one in together) == sum(made)

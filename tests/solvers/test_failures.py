@@ -61,7 +61,8 @@ def test_a_limit_that_was_reached_is_said(
 
 
 THROUGH_QPSOLVERS = ("scs", "qpalm")
-UNPRECONDITIONED = {"preconditioner": "none"}
+#: With options of their own.
+OPTIONS = {"mprgp": {"preconditioner": "none"}, "cvxpy for Clarabel": {"via": "CLARABEL"}}
 SILENT = ("gi", "l-bfgs-b")
 ITERATIVE = [
     *(
@@ -74,7 +75,7 @@ ITERATIVE = [
         "textbook-active-set",
         "l-bfgs-b",
     ),
-    *("clarabel", "cvxpy", "osqp", "piqp", "proxqp", "scs", "qpalm"),
+    *("clarabel", "cvxpy", "cvxpy for Clarabel", "osqp", "piqp", "proxqp", "scs", "qpalm"),
 ]
 
 
@@ -83,7 +84,7 @@ def test_a_solver_stops_after_the_iterations_that_are_allowed(
     name: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     prepared = make_strips(400) if name == "newton" else make_prepared(4, 30, 5)
-    solver = make_solver(name, UNPRECONDITIONED if name == "mprgp" else {})
+    solver = make_solver(name.partition(" ")[0], OPTIONS.get(name, {}))
     vars(solver).update(iteration_limit=1, prints=True)
     session = SolverSession(solver, in_form(prepared, "dual"), 1e-10)
     session.open(batched=False)

@@ -218,7 +218,7 @@ def test_a_large_y_does_not_hide_an_overlap() -> None:
     newton = NewtonSteps(np.eye(2), np.array([3.0, 1.0]), SYSTEMS["direct"](np.eye(2)), 0.9, 1e-3, 100)
     point = newton.at(np.ones(2), np.full(2, 1e20))
     np.testing.assert_array_equal(point.gap, [-2.0, 0.0])
-    assert point.infeasibility >= 2.0
+    assert point.infeasibility() >= 2.0
     assert Point(np.ones(2), np.ones(2), np.array([-2.0, 0.0])).s1.tolist() == [3.0, 1.0]
 
 

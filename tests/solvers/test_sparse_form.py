@@ -134,6 +134,16 @@ def test_forces_whose_rounding_is_above_the_tolerance() -> None:
     assert with_x(problem_in(data, "sparse"), [off], [load], 1e-10)[0].status == "inaccurate"
 
 
+@pytest.mark.parametrize(("length", "status"), [(1.0, "solved"), (2.0, "inaccurate")])
+def test_what_may_be_rounding_is_so_in_mm(length: float, status: str) -> None:
+    """y = 2⁻²⁴ is an ulp of g = −2²⁸ and 0.6e-7 of a unit of length, which is 1 mm or 2 mm."""
+    data = Prepared(Assembly(Stiffness.of(sp.csc_array([[1.0]])), sp.csc_array([[1.0]])))
+    load = LoadCase(np.zeros(1), np.array([-(2.0**28)]), length=length)
+    off = Answer("inaccurate", np.array([2.0**28 + 2.0**-24]))
+    (answer,) = with_x(problem_in(data, "sparse"), [off], [load], 1e-10)
+    assert (answer.status, answer.details["kkt_residual_mm"]) == (status, 2.0**-24)
+
+
 @pytest.mark.parametrize(
     ("n", "seed", "difficulty"), [(500, 1009, 19 / 24), (500, 1011, 23 / 24), (3000, 1005, 11 / 16)]
 )
