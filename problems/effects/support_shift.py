@@ -34,7 +34,7 @@ class SupportShift(PartLoadEffect):
 
         shifted, supported = points(SupportShift), points(Supports)
         for k, point in enumerate(self.points):
-            if point not in supported:
+            if others and point not in supported:  # alone, it may have supports in another stage
                 allowed = f"a point of a supports effect of part {self.part}, one of {supported}"
                 yield f"points[{k}]", list(point), allowed
             if point in shifted:

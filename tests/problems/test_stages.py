@@ -386,3 +386,14 @@ def test_an_approach_of_another_length_that_stages_divide_is_refused() -> None:
         joined(HALVES, [*EFFECTS[:2], EFFECTS[2] | {"approach": [0.1] * 3}])
     allowed = [fault.allowed for fault in error.value.faults]
     assert [allowed[0], allowed[1][:8]] == ["one number, or one for each of 4 springs", "left out"]
+
+
+def test_supports_that_are_shifted_in_a_stage() -> None:
+    """The last of two stages is the scene in which the supports are shifted from the start."""
+    supports = {"kind": "supports", "part": "a", "points": [[0.0, 0.0], [400.0, 0.0], [200.0, 120.0]]}
+    shift = {"kind": "support_shift", "name": "jack", "part": "a", "points": [[200.0, 120.0]], "shift": 0.5}
+    held = [*EFFECTS[:1], supports, shift]
+    first, last = stage_scenes(joined([{"name": "lie"}, {"name": "lift", "on": ["jack"]}], held)).values()
+    assert abs(load_case(first).f).max() == 0.0
+    assert abs(load_case(last).f).max() > 1.0
+    np.testing.assert_array_equal(load_case(last).f, load_case(joined([], held)).f)
