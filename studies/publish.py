@@ -246,7 +246,7 @@ def _how_fast(folder: Path) -> str:
     if rows_of(folder / "series"):
         rows = read(folder / "series").rows
         proven = {SERIES[name][0]: _seconds(folder / name) for name in SERIES if rows_of(folder / name)}
-        tables.append(in_series(rows[rows["threads"] == rows["threads"].max()], proven))
+        tables.append(in_series(rows[rows["threads_asked"] == rows["threads_asked"].max()], proven))
     table = pd.concat([pd.DataFrame(), *tables])
     if table.empty:
         return ""

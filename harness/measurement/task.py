@@ -131,6 +131,7 @@ def _row(
         "limit_mm": limit_mm,
         "limit_asked_mm": m.suite.limit_mm,
         "threads_asked": m.threads,
+        "batched_asked": m.entry.batched,
         "time_limit_s": m.time_limit_s,
         "memory_limit_mib": m.suite.memory_limit_mib,
         **origin,

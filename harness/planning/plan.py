@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
+from hashlib import sha256
 from itertools import product
 from math import inf
 from typing import Any
@@ -27,6 +28,7 @@ ROUND = " round="  # before the time, in the keys of a round
 ITERATION_LIMITS = [2**k for k in range(20)]
 BEST = 1.0
 QUICK = 0.1  # of the time limit: what the other scenes of a size may take
+LEGIBLE = 120  # characters of a file name
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ class Measurement:
     @property
     def process(self) -> tuple[object, ...]:
         """The identity of a process, which load cases of a series may share."""
-        return self.scene, self.solver, self.form, self.variant, self.tolerance, self.threads, self.repeat
+        words = self.scene, self.solver, self.form, self.variant, self.tolerance, self.threads, self.repeat
+        return *words, self.entry.batched
 
     @cached_property
     def key(self) -> str:
@@ -105,15 +108,9 @@ class Measurement:
 
     @property
     def stem(self) -> str:
-        """The stem of its file names."""
-        words = [self.scene, self.solver, self.form, self.variant, f"{self.tolerance:g}"]
-        words += [
-            f"t{self.threads}",
-            f"r{self.repeat}",
-            "" if self.case is None else f"c{self.case}",
-            self.round,
-        ]
-        return re.sub(r"[^\w.+-]+", "-", "_".join(filter(None, words)))
+        """The stem of its file names: its key, legible, and a fingerprint that keeps it distinct."""
+        legible = re.sub(r"[^\w.+-]+", "-", self.key, flags=re.ASCII)[:LEGIBLE]
+        return f"{legible}-{sha256(self.key.encode(errors='backslashreplace')).hexdigest()[:10]}"
 
 
 def expand(suite: Suite) -> list[Measurement]:
@@ -123,13 +120,15 @@ def expand(suite: Suite) -> list[Measurement]:
     the machine does not affect one solver alone. Measurements that differ only in tolerance or load case keep
     their order.
 
-    Raises InputError if nothing is left to measure or if two files have the same scene name.
+    Raises InputError if nothing is left to measure or if the files of two scenes would have the same names.
     """
     scenes: dict[str, Scene] = {}
+    files: dict[str, str] = {}
     faults: list[Fault] = []
     for source, scene in zip(suite.scenes, read_all(read_scene, suite.scenes), strict=True):
-        if scene.name in (other.name for other in scenes.values()):
-            allowed = f"another is called {scene.name} too; rename it"
+        file = scene.name.replace("/", "_")
+        if files.setdefault(file, source) != source:
+            allowed = f"another is called {file} too, in the names of files; rename one"
             faults.append(Fault(suite.name, "scenes", source, allowed))
         if not scene.refused:
             scenes[source] = scene

@@ -151,6 +151,7 @@ class MeasurementRow(Report, Origin, total=False):
     options: dict[str, Any]
     gated: bool
     threads_asked: int
+    batched_asked: int | None  # of a series: how many load cases were to be solved at once
     case: int | None  # of a series, its law:
     series: dict[str, Any] | None
     time_limit_s: float

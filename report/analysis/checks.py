@@ -35,7 +35,7 @@ def warnings(results: Results) -> list[str]:
     if len(other):
         doubts.append(
             f"In {counted(len(other), 'row')} ({listed(sorted(other['solver'].unique()))}) the number of "
-            "threads in effect was not the requested one; the tables give the one in effect."
+            "threads in effect was not the requested one, by which the tables name and group them."
         )
     return [*doubts, *results.warnings]
 

@@ -70,8 +70,9 @@ def compared(
 
 
 def merged(rows: pd.DataFrame) -> pd.DataFrame:
-    """One line per measurement, its repeats merged."""
+    """One line per measurement, its repeats merged. Seconds of answers outside the limit are missing."""
     cells = cells_of(rows, ["measurement"]).set_index("measurement")
+    cells["load_case_s"] = cells["load_case_s"].where(cells["verdict"] != "outside")
     vary = np.where(cells["repeats"] < ENOUGH, TIE, 1.0)
     cells["least_s"] = np.minimum(cells["least_s"], cells["load_case_s"] / vary)
     cells["most_s"] = np.maximum(cells["most_s"], cells["load_case_s"] * vary)
@@ -108,7 +109,7 @@ def _errors(table: pd.DataFrame) -> list[pd.Series[float]]:
 
 
 def _digits(old: float, new: float, bound: float, limit: float) -> float:
-    floor = floor_mm(0.0 if np.isnan(bound) else bound, limit)
+    floor = floor_mm(bound, limit)
     return digits_lost(old, new, floor) if np.isfinite([old, new, floor]).all() and floor > 0 else np.nan
 
 

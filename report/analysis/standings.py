@@ -34,7 +34,7 @@ SHIFT_S = 1.0
 #: A chart shows the methods that were run on at least this share of its scenes.
 SHOWN = 0.5
 NOT_RUN = ("unsupported", "not_run")
-ROUND = ["scene", "threads"]
+ROUND = ["scene", "threads_asked"]
 
 
 def with_errors(cells: pd.DataFrame) -> pd.DataFrame:
@@ -109,9 +109,11 @@ def standings(cells: pd.DataFrame) -> pd.DataFrame:
 
     load_case_s_<n> : the geometric mean at size n, of the methods within the limit on every scene of it.
     shifted_mean_s : the shifted geometric mean of `total_s`, of the methods measured on every scene; one that
-    is not within the limit counts with its time limit.
+    is not within the limit counts with the largest time limit on its scene.
     """
-    cells = best_tolerances(cells[cells["status"] != "unsupported"])
+    cells = cells[cells["status"] != "unsupported"]
+    limits = cells.groupby("scene")["time_limit_s"].transform("max")
+    cells = best_tolerances(cells.assign(time_limit_s=limits))
     if cells.empty:
         return cells
     good = cells[cells["verdict"] == "within"]
@@ -195,9 +197,11 @@ def seconds_text(cell: Mapping[str, Any]) -> str:
 
 def of_fastest(owner: str, rows: pd.DataFrame, *names: str) -> pd.Series[float]:
     """The seconds of the fastest solver of that owner, for each row: on its scene, with as many threads, the
-    least of the medians of any of the names.
+    least of the medians of any of the names. A solver counts if all its answers there are within the limit.
     """
-    medians = rows[rows["owner"] == owner].groupby(CELL, dropna=False)[[*names]].median().min(axis=1)
+    rows = rows.assign(within=rows["verdict"] == "within")
+    groups = rows[rows["owner"] == owner].groupby(CELL, dropna=False)
+    medians = groups[[*names]].median().min(axis=1).where(groups["within"].all())
     return rows.join(medians.groupby(ROUND).min().rename("fastest"), on=ROUND)["fastest"]
 
 

@@ -24,7 +24,7 @@ FILTERS = {
     "n": "size n",
     "contact": "contact",
     "form": "form",
-    "threads": "threads",
+    "threads_asked": "threads",
     "owner": "solvers",
     "tolerance": "tolerance",
     "ladder": "ladder",

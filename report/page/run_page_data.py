@@ -30,14 +30,15 @@ from report.results.reader import Results
 from report.results.rows import CELL, in_order
 
 TEXTS = (
-    *("scene", "method", "label", "solver", "owner", "form", "variant", "status", "verdict", "machine"),
-    *("title", "ladder", "contact", "message", "solver_version", "solver_code"),
+    *("scene", "method", "label", "solver", "owner", "form", "variant", "settings", "status", "verdict"),
+    *("machine", "title", "ladder", "contact", "message", "solver_version", "solver_code"),
     *("commit", "recorded_at", "device", "log", "key"),
 )
 NUMBERS = (
-    *("n", "m", "active", "tolerance", "threads", "repeats", "iterations", "inner_iterations"),
-    *("load_case_s", "least_s", "most_s", "total_s", "scene_s", "peak_rss_mib", "time_limit_s"),
-    *("displacement_error_mm", "reached_mm", "bound_mm", "least_mm", "backward_error", "contact_mismatch"),
+    *("n", "m", "active", "tolerance", "threads", "threads_asked", "repeats", "iterations"),
+    *("inner_iterations", "load_case_s", "least_s", "most_s", "total_s", "scene_s", "peak_rss_mib"),
+    *("time_limit_s", "displacement_error_mm", "reached_mm", "bound_mm", "least_mm", "backward_error"),
+    "contact_mismatch",
 )
 LIMIT_MM = 1e-7  # of rows that do not say
 CONTACT = {"up to 10 %": 0.1, "10 to 50 %": 0.5, "above 50 %": 1.0}
@@ -63,7 +64,7 @@ DRAWN_MM = (1e-16, 1.0)  # errors of the view of work and precision
 OF_ONE_SOLVER = {
     "scene": "scene",
     "tolerance": "tolerance",
-    "options": "options",
+    "settings": "options",
     "status": "reported",
     "displacement_error_mm": "error, mm",
     "over": "error / limit",
@@ -118,10 +119,7 @@ def run_data(results: Results) -> Data:
         "columns": list(OF_ONE_SOLVER.items()),
         "styles": {name: _look(style) for name, style in line_styles(cells).items()},
         "scenes": scenes,
-        "cells": {
-            **{name: column(cells[name]) for name in (*TEXTS, *NUMBERS)},
-            "options": column(cells["options"].map(_options)),
-        },
+        "cells": {name: column(cells[name]) for name in (*TEXTS, *NUMBERS)},
         "maps": maps,
         "figures": figures,
     }
@@ -146,23 +144,18 @@ def _cells(results: Results) -> pd.DataFrame:
     else:
         cells = cells.assign(scene_s=float("nan"))
     eased = cells["scene"].str.startswith(LADDERS) & (cells["limit_mm"] > cells["limit_asked_mm"])
-    answered = cells["displacement_error_mm"].notna()
+    reached = cells[["displacement_error_mm", "bound_mm"]].max(axis=1)
+    judged = cells["displacement_error_mm"].notna() & (reached < math.inf)
     titles = {problem.get("scene"): str(problem.get("title") or "") for problem in records(results.problems)}
     share = pd.cut(cells["active"] / cells["m"], [-1.0, *CONTACT.values()], labels=list(CONTACT))
-    cells = cells.assign(
+    return cells.assign(
         least_mm=cells["limit_mm"].where(eased),
-        reached_mm=cells[["displacement_error_mm", "bound_mm"]].max(axis=1).clip(*DRAWN_MM).where(answered),
+        reached_mm=reached.clip(*DRAWN_MM).where(judged),
         total_s=cells["load_case_s"] + cells["once_s"].fillna(0.0),
         ladder=cells["scene"].map(_ladder),
         title=cells["scene"].map(lambda scene: titles.get(scene, "")),
         contact=share.cat.add_categories("").fillna("").astype(object),
     )
-    return cells if "options" in cells else cells.assign(options=None)
-
-
-def _options(options: object) -> str:
-    given = options if isinstance(options, dict) else {}
-    return ", ".join(f"{name} = {value}" for name, value in given.items())
 
 
 def _look(style: dict[str, Any]) -> Data:

@@ -1,7 +1,7 @@
 """What a results directory holds, read into data frames.
 
-`rows` has one row per measurement, `cells` one per scene and solver (form, variant, tolerance, threads),
-with the repeats merged.
+`rows` has one row per measurement, `cells` one per scene, solver and settings (CELL of rows.py), with the
+repeats merged.
 """
 
 import json

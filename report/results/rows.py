@@ -5,6 +5,7 @@ Of repeats, nothing looks better than it was.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,7 +18,8 @@ from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
-CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads", "round"]
+CELL = ["machine", "scene", "solver", "form", "variant", "settings", "batched_asked"]
+CELL += ["tolerance", "threads_asked", "round"]
 VERSION = ["solver_version", "solver_code"]
 MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
 MEDIANS += ["solver_reported_s", "cholesky_s", "product_s"]
@@ -29,24 +31,35 @@ def frame(records: list[dict[str, Any]], by: Sequence[str] = ()) -> pd.DataFrame
 
     by : columns in which equal measurements do not differ, beside those of a cell.
 
-    Flags are 1.0, 0.0 or missing. Adds `working_mib`, the memory that the solver needs on top of the data.
+    Flags are 1.0, 0.0 or missing; a null bound beside an error is infinite. Adds `settings`, the options as
+    text, and `working_mib`, the memory that the solver needs on top of the data.
     """
     rows = pd.DataFrame(records)
     columns: dict[str, Any] = dict(rows)
+    columns["settings"] = rows["options"].map(_settings) if "options" in rows else ""
     for name in [*NUMBERS, *FLAGS]:
         columns[name] = pd.to_numeric(rows[name], errors="coerce").astype(float) if name in rows else np.nan
     for name in TEXTS:
         columns[name] = rows[name].map(lambda v: "" if pd.isna(v) else str(v)) if name in rows else ""
     rows = pd.DataFrame(columns, index=rows.index)
-    rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
+    rows["threads_asked"] = rows["threads_asked"].fillna(rows["threads"])
+    unproven = rows["reference_bound_mm"].isna() & rows["displacement_error_mm"].notna()
+    rows["reference_bound_mm"] = rows["reference_bound_mm"].mask(unproven, np.inf)
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
     rows = rows.drop_duplicates([*CELL, "repeat", "case", *by], keep="last")
     line = [name for name in (*CELL, *by) if name != "tolerance"]
     return rows[chosen(rows, line)].reset_index(drop=True)
 
 
+def _settings(options: object) -> str:
+    """'rho = 0.1, scaling = 0'."""
+    values = options if isinstance(options, dict) else {}
+    texts = {name: json.dumps(value, ensure_ascii=False, sort_keys=True) for name, value in values.items()}
+    return ", ".join(f"{name} = {text}" for name, text in sorted(texts.items()))
+
+
 def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:
-    """One line per scene, solver, form, variant, tolerance and number of threads, or of what else is given.
+    """One line per scene, solver, form, variant, tolerance and so on (CELL), or of what else is given.
 
     Of the repeats: the worst verdict with its status, the largest error and memory, and the median of each
     time over those that have it. Adds, in seconds,
@@ -79,18 +92,29 @@ def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:
 
 
 def named(cells: pd.DataFrame) -> pd.DataFrame:
-    """Cells with `method`, 'solver (form)' with the variant if it has one and the number of threads
-    if several were used, and `label`, the same with the tolerance if there are several that were asked for.
+    """Cells with `method`, 'solver (form)' with the variant if it has one, and the options and the number of
+    threads if there are several; `label`, the same with the tolerance if several were asked for.
+
+    The load cases solved at once are named where there are several such numbers on one scene.
     """
-    variant = cells["variant"].map(lambda name: f" {name}" if name else "").astype(str)
-    threads = cells["threads"].map(lambda k: f" × {counted(int(k), 'thread')}").astype(str)
-    tolerance = cells["tolerance"].map(lambda value: f" {tidy_power(value)}").astype(str)
-    by_line = cells.groupby(["solver", "form", "variant"], dropna=False)
-    threads = threads.where(by_line["threads"].transform("nunique") > 1, "")
-    several = by_line["tolerance"].transform("nunique") > 1
-    tolerance = tolerance.where(several & (cells["searched"] != 1.0), "")
-    method = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
+    line, batched = [cells[name] for name in ("solver", "form", "variant")], cells["batched_asked"]
+    several = cells.groupby(line)[["settings", "threads_asked", "tolerance"]].transform("nunique") > 1
+    on_one_scene = batched.fillna(0).groupby([*line, cells["scene"]]).transform("nunique") > 1
+    at_once = on_one_scene.groupby(line).transform("any") & batched.notna()
+    words = [
+        cells["variant"],
+        cells["settings"].where(several["settings"], ""),
+        batched.map("{:.0f} at once".format).where(at_once, ""),
+        cells["threads_asked"].map(_threads).where(several["threads_asked"], ""),
+        cells["tolerance"].map(tidy_power).where(several["tolerance"] & (cells["searched"] != 1.0), ""),
+    ]
+    *words, tolerance = [(" " + word.astype(str)).where(word != "", "") for word in words]
+    method = sum(words, cells["solver"] + " (" + cells["form"] + ")")
     return cells.assign(method=method, label=method + tolerance)
+
+
+def _threads(number: float) -> str:
+    return f"× {counted(int(number), 'thread')}" if np.isfinite(number) else ""
 
 
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:

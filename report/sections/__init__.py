@@ -48,7 +48,7 @@ SECTIONS: list[tuple[About, Callable[[Results], Section | None]]] = [
     ("scenes", speed.machine),
     ("scenes", speed.scaling),
     ("scenes", speed.methods),
-    ("scenes", series_throughput.section),
+    ("all", series_throughput.section),
     ("scenes", accuracy.costs),
     ("scenes", accuracy.tolerances),
     ("scenes", all_measurements.section),

@@ -73,7 +73,7 @@ def scaling(results: Results) -> Section | None:
     """Exponents in n for the scenes scaling/…, one joint on finer and finer meshes."""
     cells = best_tolerances(results.cells[results.cells["scene"].str.startswith("scaling/")])
     within = cells[cells["verdict"] == "within"].sort_values("n")
-    if not cells["cholesky_s"].notna().any() or cells["n"].nunique() < FEWEST:
+    if not within["cholesky_s"].notna().any() or within["n"].nunique() < FEWEST:
         return None
     lines = [_exponents(method, of) for method, of in within.groupby("method")]
     table = pd.DataFrame(lines).set_index("method").loc[in_order(within, "method")].reset_index()

@@ -1,5 +1,6 @@
 """Error against time within a solve, from runs that were stopped after 1, 2, 4, … iterations."""
 
+import numpy as np
 import pandas as pd
 
 from report.analysis.standings import with_errors
@@ -44,8 +45,9 @@ def section(results: Results) -> Section | None:
 
 
 def traces(cells: pd.DataFrame) -> pd.DataFrame:
-    """The stopped runs and those that end them, by `label` without the limit, with their `error`, mm."""
+    """The stopped runs and those that end them, by `label` without the limit, with a finite `error`, mm."""
     cells = named(cells.assign(variant=cells["variant"].str.replace(LIMITED, "", regex=True)))
     stopped = cells.groupby(["scene", "label"])["iteration_limit"].transform("count")
-    lines = with_errors(cells[stopped > 0]).dropna(subset="error")
+    lines = with_errors(cells[stopped > 0])
+    lines = lines[np.isfinite(lines["error"])]
     return lines.sort_values(["n", "scene", "label", "iteration_limit"], ignore_index=True)

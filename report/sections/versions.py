@@ -92,15 +92,19 @@ def _side_by_side(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _what(rows: pd.DataFrame) -> pd.Series[str]:
-    """The form, the variant without the version, and tolerance and threads where a solver has several."""
+    """The form, the variant without the version, options that differ in it, and tolerance and threads where
+    a solver has several.
+    """
     cut = asked_for(rows)
     pairs = zip(rows["variant"], rows["solver_version"], cut, strict=True)
     base = [variant.removesuffix(v).strip() if named else variant for variant, v, named in pairs]
     words = rows["form"] + [f" {name}" if name else "" for name in base]
-    several = rows.groupby("solver")[["tolerance", "threads"]].transform("nunique") > 1
+    differ = rows.groupby([rows["solver"], words])["settings"].transform("nunique") > 1
+    several = rows.groupby("solver")[["tolerance", "threads_asked"]].transform("nunique") > 1
     chosen = several["tolerance"] & (rows["searched"] != 1.0)
+    words += (" " + rows["settings"]).where(differ & (rows["settings"] != ""), "")
     words += (" " + rows["tolerance"].map(tidy_power)).where(chosen, "")
-    return words + (" × " + rows["threads"].map("{:.0f}".format)).where(several["threads"], "")
+    return words + (" × " + rows["threads_asked"].map("{:.0f}".format)).where(several["threads_asked"], "")
 
 
 def _numbers(version: str) -> list[int]:

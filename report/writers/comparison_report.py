@@ -20,7 +20,8 @@ from report.writers.sections_writer import written
 NOTE = (
     "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
     "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
-    "fewer than three are taken to vary by 15 %, or as the ratios of the other measurements do."
+    "fewer than three are taken to vary by 15 %, or as the ratios of the other measurements do. An answer "
+    "outside the limit has none."
 )
 SIDES = ("old", "new")
 

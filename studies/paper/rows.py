@@ -102,7 +102,7 @@ def study_of(results: Results) -> Study:
     if results.rows["machine"].nunique() > 1:
         raise ValueError(f"{results.directory}: times of several machines cannot be compared")
     cells = timed(results.cells[results.cells["status"] != "unsupported"])
-    cells = cells.sort_values(["tolerance", "threads"], ascending=[True, False], kind="stable")
+    cells = cells.sort_values(["tolerance", "threads_asked"], ascending=[True, False], kind="stable")
     rows: dict[tuple[str, ...], Row] = {}
     for row in _records(cells.sort_values(["n", "active", "scene"], kind="stable")):
         row |= {name: row.get(name) or {} for name in ("options", "details")}

@@ -85,6 +85,27 @@ def test_slower_beyond_noise(before: list[float], after: list[float], code: int,
     assert compare(old, new, "--max-slowdown", 5).exit_code == 0
 
 
+def test_what_cannot_be_judged_loses_no_digits(tmp_path: Path) -> None:
+    """A bound of null is infinite, not zero."""
+    unproven: dict[str, Any] = {"reference_bound_mm": None, "verdict": "cannot_be_judged"}
+    sides = [write_rows(tmp_path / str(e), [row(displacement_error_mm=e) | unproven]) for e in (1e-9, 1e-6)]
+    assert compare(*sides, "--out", tmp_path / "out").exit_code == 0
+    (line,) = lines(tmp_path / "out")
+    assert (line["change"], line["digits_lost"]) == ("", "")
+
+
+def test_seconds_of_wrong_answers_enter_no_mean(tmp_path: Path) -> None:
+    """Twice as fast within the limit, ten times as slow where both are outside it."""
+    bad = {"verdict": "outside", "displacement_error_mm": 2e-7}
+    for side, seconds in (("old", (2.0, 1.0)), ("new", (1.0, 10.0))):
+        good, wrong = ({"solve_s": s, "setup_s": 0.0, "form_s": 0.0} for s in seconds)
+        write_rows(tmp_path / side, [row("4386/0001", **good), row("4386/0002", **wrong | bad)])
+    assert compare(tmp_path / "old", tmp_path / "new", "--out", tmp_path / "out").exit_code == 0
+    assert [line["ratio"] for line in lines(tmp_path / "out")] == ["0.5", ""]
+    with (tmp_path / "out" / "solvers.csv").open() as file:
+        assert [line["ratio"] for line in csv.DictReader(file)] == ["0.5"]
+
+
 def test_what_became_worse_comes_first_and_the_worst_at_the_top(tmp_path: Path) -> None:
     scenes = [f"4386/{k:04d}" for k in range(6)]
     changed: list[dict[str, Any]] = [

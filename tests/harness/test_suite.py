@@ -1,5 +1,6 @@
 """Suite files, the plan made of them, and what the command line changes."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -7,8 +8,9 @@ import pytest
 import tiny_joint
 from commands import harness
 
+from harness.measurement.suite_run import batches
 from harness.planning.overrides import Overrides, overridden
-from harness.planning.plan import Measurement, expand, with_key
+from harness.planning.plan import Measurement, expand, of_key, with_key
 from harness.planning.suite import Suite, read_suite, suite_from, suite_names, to_toml, validated
 from problems.errors import InputError
 
@@ -56,7 +58,7 @@ def test_repeats_are_interleaved_and_shuffled_the_same_way_each_time(tmp_path: P
     plan = plan_of(tmp_path, repeats=4)
     assert [m.repeat for m in plan] == sorted(m.repeat for m in plan)
     assert [m.key for m in plan] == [m.key for m in plan_of(tmp_path, repeats=4)]
-    rounds = [[m.stem[:-1] for m in plan if m.repeat == repeat] for repeat in range(4)]
+    rounds = [[m.key[:-1] for m in plan if m.repeat == repeat] for repeat in range(4)]
     assert len({tuple(one) for one in rounds}) > 1
     assert len({frozenset(one) for one in rounds}) == 1
 
@@ -207,6 +209,37 @@ def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
     tiny_joint.write_problem(tmp_path / "other" / "tiny.npz")
     with pytest.raises(InputError, match="another is called tiny too"):
         plan_of(tmp_path, scenes=["tiny.npz", "other/tiny.npz"])
+
+
+def test_two_scenes_whose_files_would_have_one_name_are_refused(tmp_path: Path) -> None:
+    own = tiny_joint.write_problem(tmp_path / "4386_0107.npz")
+    with pytest.raises(InputError, match="another is called 4386_0107 too") as caught:
+        plan_of(tmp_path, scenes=["4386/0107", own.name])
+    assert [fault.value for fault in caught.value.faults] == [str(own)]
+
+
+def test_files_are_as_distinct_as_the_rows_they_belong_to(tmp_path: Path) -> None:
+    """In their options too, and where a name has characters, or a length, that a file cannot have."""
+    scenes = [f"{name}.npz" for name in ("a b", "a-b", "ü" * 120)]
+    for scene in scenes:
+        tiny_joint.write_problem(tmp_path / scene)
+    plan: list[Measurement] = []
+    for changed in ({"variant": "eps<1"}, {"variant": "eps>1"}, {"options": {"k": 1}}, {"options": {"k": 2}}):
+        solver = {"name": "gi", "forms": ["dual"]} | changed
+        plan += expand(suite_from({"scenes": scenes, "solver": [solver]}, tmp_path / "suite.toml"))
+    assert len({m.stem for m in plan}) == len({m.key for m in plan}) == 12
+    assert all(re.fullmatch(r"[\w.+-]{1,200}", m.stem, re.ASCII) for m in plan)
+
+
+def test_load_cases_that_are_solved_at_once_in_two_ways_are_of_two_processes(tmp_path: Path) -> None:
+    ways = [{"name": "newton", "forms": ["dual"], "variant": "batched", "batched": k} for k in (2, 4)]
+    data = {"scenes": ["4386/0107"], "series": {"cases": 4}, "solver": ways}
+    plan = expand(suite_from(data, tmp_path / "suite.toml"))
+    assert len({m.stem for m in plan}) == len({m.key for m in plan}) == 8
+    assert [[(m.entry.batched, m.case) for m in batch] for batch in batches(plan)] == [
+        [(k, case) for case in range(4)] for k in (2, 4)
+    ]
+    assert [m.entry.batched for m in of_key(plan, plan[-1].key)] == [4] * 4
 
 
 # Versions of a library.

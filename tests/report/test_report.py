@@ -65,6 +65,15 @@ def test_the_shifted_mean_counts_what_is_missing_or_outside_with_its_limit(tiny:
     assert lines.tolist() == pytest.approx([90**0.5 - 1, 74**0.5 - 1, 67.1**0.5 - 1, 60.0])
 
 
+def test_a_failure_counts_with_the_largest_limit_on_its_scene(tmp_path: Path) -> None:
+    """Not with its own, by which the method that gives up early would be the better one."""
+    limits = {"a": 10.0, "b": 100.0, "c": 40.0}
+    rows = [row(LOW, name, **no_answer("time_limit") | {"time_limit_s": s}) for name, s in limits.items()]
+    rows[-1] = row(LOW, "c", **times(solve_s=30.0) | {"time_limit_s": 40.0})
+    lines = standings(results(tmp_path, rows).cells).set_index("method")["shifted_mean_s"]
+    assert lines.to_dict() == pytest.approx({"a (dual)": 100.0, "b (dual)": 100.0, "c (dual)": 30.0})
+
+
 def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_path: Path) -> None:
     seconds = {"a": (1.0, 2.0, 8.0, 1.0), "b": (3.0, 1.0, 4.0, None)}
     rows = [
@@ -79,6 +88,7 @@ def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_pat
     lines = [[*line] for _, *line in figure.data[["method", "ratio", "share"]].itertuples()]
     a = [["a (dual)", ratio, share] for ratio, share in ((1, 0.25), (1, 0.5), (2, 0.75), (2, 1.0))]
     assert lines == [*a, *(["b (dual)", ratio, share] for ratio, share in ((1, 0.25), (1, 0.5), (3, 0.75)))]
+    assert "the fastest among them, are methods run on at least half" in figure.caption
     assert profile.section(results(tmp_path / "two", rows[:2])) is None
     fewer = profile.profile(results(tmp_path / "fewer", rows[:6]).cells)  # b on two scenes alone
     assert fewer.loc[fewer["method"] == "b (dual)", "share"].tolist() == [0.5, 1.0]
@@ -162,6 +172,36 @@ def test_several_tolerances_and_threads_stand_in_the_label(tmp_path: Path) -> No
         "c (dual) direct",
     }
     assert set(results(tmp_path, rows).cells["label"]) == labels
+
+
+def test_a_run_without_an_answer_stands_with_the_others_of_its_method(tmp_path: Path) -> None:
+    """A killed run does not say how many threads were in effect, which is not what was asked for."""
+    scenes = [f"4386/{k:04d}" for k in range(5)]
+    rows = [row(scene, "mine", threads=1) for scene in scenes[:4]]
+    rows.append(row(scenes[4], "mine", threads=None, **no_answer("crashed")))
+    rows += [row(scene, "newton", threads=1) for scene in scenes]
+    lines = standings(results(tmp_path, rows).cells)
+    assert lines[["method", "within", "scenes"]].to_numpy().tolist() == [
+        ["newton (dual)", 5, 5],
+        ["mine (dual)", 4, 5],
+    ]
+
+
+def test_what_is_a_row_of_its_own_is_a_line_of_its_own(tmp_path: Path) -> None:
+    """Options, load cases solved at once and threads asked for, where two of them are on one scene."""
+    rows = [row(LOW, "a", options={"k": k, "via": "x"}) for k in (1, 2)]
+    rows += [row(LOW, "b", batched_asked=k, batched=1) for k in (8, 16, None)]
+    rows += [row(LOW, "c", threads=2, threads_asked=k) for k in (2, 4)]
+    rows += [row(LOW, "d", batched_asked=8), row(HIGH, "d", batched_asked=4)]
+    rows += [row(scene, "e", options={"k": 1}) for scene in (LOW, HIGH)]
+    read_back = results(tmp_path, rows)
+    assert (len(read_back.rows), read_back.left_out) == (len(rows), 0)
+    assert set(read_back.cells["method"]) == {
+        *(f'a (dual) k = {k}, via = "x"' for k in (1, 2)),
+        *("b (dual) 8 at once", "b (dual) 16 at once", "b (dual)"),
+        *(f"c (dual) × {k} threads" for k in (2, 4)),
+        *("d (dual)", "e (dual)"),
+    }
 
 
 def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:

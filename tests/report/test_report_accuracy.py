@@ -9,6 +9,7 @@ from synthetic_results import HIGH, LOW, answer, no_answer, results, row, shown,
 
 from report.analysis.standings import best_tolerances, fastest_first, swept, with_errors
 from report.document.blocks import Figure
+from report.page.run_page_data import run_data
 from report.results.reader import Results
 from report.sections import accuracy, summary
 from report.writers.suite_report import write
@@ -111,6 +112,23 @@ def test_a_reference_too_coarse_for_an_accuracy_does_not_judge_it(tmp_path: Path
     assert line["price_1e-7"] == "1.28 s"
     assert line["price_1e-9"] == "cannot be judged"
     assert advised(coarse).loc[1e-9, "use"] == "cannot be judged: the reference is not accurate enough"
+
+
+def test_where_nothing_is_proven_nothing_is_judged_drawn_or_trusted(tmp_path: Path) -> None:
+    """An infinite bound is null in the rows; on the other scene all is as before."""
+    unproven = {"reference_bound_mm": None, "verdict": "cannot_be_judged"}
+    some = results(tmp_path / "some", [r | (unproven if r["scene"] == HIGH else {}) for r in sweep()])
+    uses = advised(some).loc[[1e-3, 1e-5, 1e-9], "use"]
+    assert set(uses) == {"cannot be judged: the reference is not accurate enough"}
+    trust = accuracy.trust(some).set_index("method")
+    assert trust.loc["honest (dual)", "solved"] == 9
+    (axes,) = panels(some)
+    assert axes.get_title() == "n = 4386, 100 active"
+    none = results(tmp_path / "none", [r | unproven for r in sweep()])
+    for k in (3, 5, 7, 9):
+        assert set(prices(none)[f"price_1e-{k}"]) == {"cannot be judged"}
+    assert accuracy.tolerances(none) is None
+    assert not [each for each in run_data(none)["cells"]["reached_mm"] if each is not None]
 
 
 def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:

@@ -113,6 +113,16 @@ def test_the_report_keeps_many_drawn_scenes_apart(tmp_path: Path, monkeypatch: p
     assert pd.read_csv(tmp_path / "report" / "drawn.csv")["n"].to_list() == [4386] * 4 + [6112]
 
 
+def test_a_series_on_many_drawn_scenes_is_in_the_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("report.results.reader.MOST_SHOWN", SCENES - 1)
+    rows = [drawn(k, "newton", "dual", case=case, warm=case > 0) for k in range(SCENES) for case in range(2)]
+    page = write(write_rows(tmp_path, rows)).read_text("utf-8")
+    assert "## Series of load cases" in page
+    assert len(pd.read_csv(tmp_path / "report" / "series.csv")) == SCENES
+
+
 @pytest.mark.usefixtures("without_pictures")
 def test_nothing_but_failures_is_a_section_too(tmp_path: Path) -> None:
     rows = [row | no_answer("not_run") for row in every_row()]

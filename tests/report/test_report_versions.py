@@ -70,4 +70,7 @@ def test_variants_tolerances_and_the_installed_version_are_told_apart(tmp_path: 
     searched = [of("1", searched=True, tolerance=1e-6), of("2", searched=True, tolerance=1e-8)]
     _, table = told(tmp_path / "searched", searched).blocks
     assert [line[1:3] for line in shown(table)[1:]] == [["dual", "1"], ["dual", "2"]]
+    options = [of(version, options={"k": k}) for k in (1, 2) for version in "12"]
+    _, table = told(tmp_path / "options", options).blocks
+    assert [line[1:3] for line in shown(table)[1:]] == [[f"dual k = {k}", v] for k in (1, 2) for v in "12"]
     assert told(tmp_path / "one", [of("1.0"), of("1.0", HIGH), of("2.0", solver="osqp")]) is None

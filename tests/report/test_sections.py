@@ -2,6 +2,8 @@
 
 import json
 import re
+from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs
@@ -9,9 +11,11 @@ from urllib.parse import parse_qs
 import pandas as pd
 import pytest
 from matplotlib.image import imread
-from synthetic_results import everything, no_answer, results, row, write_rows
+from synthetic_results import everything, no_answer, results, row, sweep, write_rows
 
-from report.document.blocks import WIDEST, Section, Table, number
+from harness.results.schema import OWNERS
+from report.document.blocks import WIDEST, Figure, Section, Table, number
+from report.page.run_page_data import run_data
 from report.results.reader import read
 from report.sections import SECTIONS, accuracy, random_scenes, speed, summary, time_to_solution
 from report.writers.sections_writer import written
@@ -63,6 +67,55 @@ def test_no_section_is_made_of_nothing(tmp_path: Path, section: Any) -> None:
 )
 def test_without_its_rows_there_is_no_section(tmp_path: Path, section: Any, rows: list[Any]) -> None:
     assert section(results(tmp_path, rows)) is None
+
+
+def every_kind() -> list[dict[str, Any]]:
+    """Rows for every section."""
+    rows = [each for each in sweep() if each["solver"] in ("honest", "late")]
+    rows += [row(LOW, "osqp", variant=version, solver_version=version) for version in ("1.0", "1.1")]
+    for n, form in product((1170, 2522, 4386), ("dual", "sparse")):
+        size = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
+        rows.append(row(LOW, "newton", form, cholesky_s=0.1, product_s=0.1, data_mib=100.0) | size)
+    drawn = ("drawn/4386/", "drawn/superelements/", "sparse/slabs/20-")
+    for k, (owner, solver) in product(range(3), zip(OWNERS, ("newton", "active-set", "piqp"), strict=True)):
+        figures = {"owner": owner, "active": 300 + k, "details": {"products": 3}, "objective": -1.0}
+        for scene in ("hard/steep/", "outside/membrane/", *drawn):
+            rows.append(row(LOW, solver, **figures) | {"scene": f"{scene}{2**k}"})
+        rows.append(row(HIGH, solver, case=k, warm=k > 0, owner=owner))
+        rows.append(row(LOW, solver, "sparse", owner=owner, repeat=k, beside_round="2026", model_s=0.1))
+        rows.append(row(HIGH, solver, variant=f"stopped at {2**k}", iteration_limit=2**k, owner=owner))
+    return [*rows, row(LOW, "active-set", "sparse", owner="textbook", round="2026")]
+
+
+UNPROVEN = {"verdict": "cannot_be_judged", "reference_bound_mm": None}
+WRONG = {"verdict": "outside", "displacement_error_mm": 1e-3}
+FAILURES: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    "none": lambda r: {},
+    "all outside": lambda r: WRONG if r["verdict"] == "within" else {},
+    "no answer": lambda r: no_answer("crashed"),
+    "nothing judged": lambda r: UNPROVEN if r["verdict"] != "no_answer" else {},
+    "no answer at one size": lambda r: no_answer("crashed") if r["n"] == 4386 else {},
+    "one method alone": lambda r: {} if r["solver"] == "newton" else no_answer("memory_limit"),
+}
+
+
+@pytest.mark.parametrize("failure", FAILURES)
+def test_every_section_bears_failures(tmp_path: Path, failure: str) -> None:
+    write_rows(tmp_path, [row(LOW, "piqp", "sparse", solver_version="0.9")])
+    (tmp_path / "measurements.jsonl").rename(tmp_path / "measurements.outdated.jsonl")
+    rows = [each | FAILURES[failure](each) for each in every_kind()]
+    found = results(tmp_path, rows, {"scene": "hard/steep/1", "title": "made up"})
+    parts = {about: found.about(about) for about in {about for about, _ in SECTIONS}}
+    made = [of(parts[about]) for about, of in SECTIONS]
+    assert all(made) or failure != "none"
+    sections = [section for section in made if section]
+    titles = {section.title for section in sections}
+    assert {"Summary", "Series of load cases", "Every solver on every scene"} <= titles
+    assert ("Error within a solve" in titles) == (failure in ("none", "all outside", "one method alone"))
+    blocks = [block for section in sections for block in section.blocks]
+    tables = [block.markdown for block in blocks if not isinstance(block, Figure)]
+    assert not {"nan", "inf"} & set(re.findall(r"\w+", "\n".join(tables).lower()))
+    assert len(run_data(found)["cells"]["key"]["places"]) == len(found.about("whole").cells)
 
 
 def test_scenes_ladders_and_drawn_scenes_have_sections_of_their_own(tmp_path: Path) -> None:

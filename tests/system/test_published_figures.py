@@ -76,7 +76,7 @@ def test_the_settings_of_the_libraries_are_those_of_the_rows() -> None:
 
 def test_the_rates_of_a_series_are_those_of_the_rows() -> None:
     """Load cases per second of the fastest line with two threads, and the fastest library's seconds."""
-    rows = compared(results("series").rows.query("threads == 2 and case.notna()"))
+    rows = compared(results("series").rows.query("threads_asked == 2 and case.notna()"))
     later = rows.groupby(["n", "solver", "variant"])["later_s"].median().groupby("n").min()
     first, *others = (f"{significant(1 / s, 2)} at {n:.0f}" for n, s in later.items())
     first = first.replace(" at ", " load cases per second at n = ")
