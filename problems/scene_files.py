@@ -151,7 +151,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint = _joint(joint_path, joint_data, effects, faults)
     if joint is not None:
         for table in tables:
-            faults += table.faults(joint, () if stages else tables)
+            faults += table.faults(joint, None if stages else tables)
             faults += table.unknown_stages([stage.name for stage in stages]) if stages else ()
         if len(effects) == len(tables):
             plan = Plan(effects, stages, joint)

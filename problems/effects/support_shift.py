@@ -25,16 +25,17 @@ class SupportShift(PartLoadEffect):
     points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), "mm"]
     shift: Annotated[Finite, "mm"]
 
-    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
-        yield from super().faults(joint, others)
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] | None = None) -> Faults:
+        """Yield the faults, those of missing supports only beside others: stages may set them."""
+        yield from super().faults(joint, others or ())
 
         def points(kind: type[SupportShift | Supports]) -> list[tuple[float, float]]:
-            mine = [other for other in others if isinstance(other, kind) and other.part == self.part]
+            mine = [other for other in others or () if isinstance(other, kind) and other.part == self.part]
             return [point for other in mine for point in other.points]
 
         shifted, supported = points(SupportShift), points(Supports)
         for k, point in enumerate(self.points):
-            if others and point not in supported:  # alone, it may have supports in another stage
+            if others is not None and point not in supported:
                 allowed = f"a point of a supports effect of part {self.part}, one of {supported}"
                 yield f"points[{k}]", list(point), allowed
             if point in shifted:

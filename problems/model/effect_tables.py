@@ -135,11 +135,12 @@ class EffectTable:
         faults = ((k, word, unknown("stage", word, names)) for k, word in words if word not in names)
         yield from self._located((f"points[{k}]", word, allowed) for k, word, allowed in faults)
 
-    def faults(self, joint: AnyJoint, tables: Sequence["EffectTable"]) -> Iterator[Fault]:
-        """Yield the faults with respect to the joint and to the effects of the other tables."""
+    def faults(self, joint: AnyJoint, tables: Sequence["EffectTable"] | None) -> Iterator[Fault]:
+        """Yield the faults with respect to the joint and to the effects of other tables that act with it."""
         if self.effect is not None:
-            others = [table.effect for table in tables if table.effect is not None and table is not self]
-            yield from self._located(self.effect.faults(joint, others))
+            others = [one.effect for one in tables or () if one.effect is not None and one is not self]
+            beside = () if tables is None else (others,)
+            yield from self._located(self.effect.faults(joint, *beside))
         elif isinstance(part := self.content.get("part"), str):
             yield from self._located(unknown_part(part, joint))
 
