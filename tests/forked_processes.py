@@ -82,7 +82,7 @@ def _become_child(
 
 
 def forked_command(*words: object, before: Callable[[], object] = lambda: None) -> Forked:
-    """`python -m harness`, which no test with workers of Dask may fork. before : called in the child."""
+    """`python -m harness`; not for tests that take `cluster`. before : called in the child."""
 
     def call() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal
