@@ -22,7 +22,7 @@ matter where λ came from. Refinement of x and λ_C in twice the working precisi
     x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
 
 by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M (closed_contacts.py), or
-with springs at the contacts of C where there is neither M nor Q (sprung_contacts.py). Load cases
+with springs at the contacts of C where there is neither M nor Q, or σ² = 0 (sprung_contacts.py). Load cases
 are columns; a column is taken out when its bound is small enough.
 """
 
@@ -51,6 +51,7 @@ MAX_WORSE = 3  # passes in a row that do not halve the bound of the last: contac
 MAX_PRODUCTS = 60  # of conjugate gradients in a pass
 REDUCTION = 1e-6  # of y_C in a pass
 FLAT = 2.0**-20  # of 1/ρ: a curvature of dependent contacts
+FEW = 2000  # unknowns of a dense K that is factored with springs
 AT_ROUNDING = 1.5  # of what roundings alone give: a bound that no further pass halves
 
 
@@ -94,9 +95,13 @@ class Proof:
 
     @cached_property
     def springs(self) -> Springs | None:
-        """K with springs, where K is sparse and there is neither M nor Q."""
-        inverse = self.inverse
-        sprung = inverse.M is None and inverse.Q is None and not self.balanced.assembly.K.dense
+        """K with springs, where K is sparse and there is neither M nor Q, or it is dense and small and the
+        contacts are almost dependent.
+        """
+        inverse, assembly = self.inverse, self.balanced.assembly
+        sprung = inverse.M is None and inverse.Q is None
+        if assembly.K.dense:
+            sprung = assembly.n <= FEW and self.balanced.sigma2 == 0
         return Springs(self.balanced, self.kappa) if sprung else None
 
     @property

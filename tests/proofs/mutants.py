@@ -375,10 +375,15 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "fresh | elements": ("fresh",),
     },
     "solvers/kkt.py": {
-        "max(float((-y).max(initial=0.0)), float(": ("max(float(",),
-        "float(abs(y[lam > 0]).max(initial=0.0))": ("0.0", "float(y[lam > 0].min(initial=0.0))"),
+        "np.where(lam > 0, abs(y), np.maximum(-y, 0.0))": (
+            "np.where(lam > 0, abs(y), 0.0)",
+            "np.maximum(-y, 0.0)",
+        ),
+        "(errors <= np.maximum(tolerance, rounding)).all()": (
+            "(errors.max() <= np.maximum(tolerance, rounding).max())",
+        ),
         "(abs(p) + abs(Q) @ lam)": ("abs(p)", "(abs(Q) @ lam)"),
-        "4 * EPS * float((abs(p) + abs(Q) @ lam)": ("8 * EPS * float((abs(p) + abs(Q) @ lam)",),
+        "4 * EPS * (abs(p) + abs(Q) @ lam)": ("8 * EPS * (abs(p) + abs(Q) @ lam)",),
     },
 }
 

@@ -244,7 +244,7 @@ def test_the_norm_of_K_is_in_balanced_units(kind: Any) -> None:
 
 
 @KINDS
-def test_nothing_is_proven_of_forces_that_pull_or_of_a_K_or_A_that_is_not(kind: Any) -> None:
+def test_nothing_is_proven_of_forces_that_pull_or_of_a_K_that_is_not(kind: Any) -> None:
     at = array(1.0, 2.0)
     proof, _ = springs(kind, 4.0, 16.0)
     assert bound(proof, LOAD, at, array(-1e-30)) == np.inf
@@ -255,8 +255,7 @@ def test_nothing_is_proven_of_forces_that_pull_or_of_a_K_or_A_that_is_not(kind: 
         twice, _ = springs(kind, 4.0, 16.0, A=[[1.0, 1.0], [0.0, 0.0]], exact=False)
         load = LoadCase(LOAD.f, array(1.0, 1.0))
         assert twice.balanced.sigma2 == 0.0
-        found = bound(twice, load, array(0.999, 2.0), array(3.0, 3.0))
-        assert (found == np.inf) if twice.balanced.assembly.K.dense else (1e-3 < found < 0.1)
+        assert 1e-3 < bound(twice, load, array(0.999, 2.0), array(3.0, 3.0)) < 0.1
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

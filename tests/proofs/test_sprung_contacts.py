@@ -64,3 +64,17 @@ def test_forces_are_refined_to_rounding_in_few_steps(
     for found in proof_of(data).proven([load] * 2, list(lam * off)):
         assert abs(found.x.hi - x).max() <= found.bound_mm <= 1e-11
         np.testing.assert_allclose(found.lam.hi, lam, atol=1e-8 * lam.max())
+
+
+@pytest.mark.parametrize("n", [14, 20])
+def test_almost_dependent_contacts_of_a_dense_stiffness_are_proven(n: int) -> None:
+    """A is unit upper triangular with −2 above the diagonal: independent, but λmin(AᵀA) is below 3⁻ⁿ."""
+    A = np.eye(n) - 2 * np.triu(np.ones((n, n)), 1)
+    random = np.random.default_rng(n)
+    x, lam = random.integers(-9, 9, n).astype(float), random.integers(0, 9, n) * (np.arange(n) % 2.0)
+    load = LoadCase(x + A @ lam, A.T @ x + np.where(lam > 0, 0, random.integers(0, 9, n)))
+    proof = proof_of(Prepared(Assembly(Stiffness.of(np.eye(n)), sp.csc_array(A))))
+    assert not proof.balanced.assembly.dependent
+    assert proof.balanced.sigma2 == 0
+    (found,) = proof.proven([load], [lam * (1 + 1e-9)])
+    assert abs(found.x.hi - x).max() <= found.bound_mm <= 1e-8
