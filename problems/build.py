@@ -124,7 +124,7 @@ class GivenModel:
                 raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
         seconds = time.perf_counter() - start
         key = digest("sparse", scene.assembly_key, fingerprint([Path(__file__)], ("problems/input",)))
-        user_K = isinstance(scene, MatricesScene)
+        user_K = isinstance(scene, MatricesScene) or scene.by_user
         return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, user_K)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:

@@ -204,3 +204,13 @@ def test_a_stiff_spring_beside_a_soft_one_is_no_part_that_moves(form: Form) -> N
     """cond(K) = 1e15 is one of the units: balanced, it is 1. x₁ = g, x₂ = f₂/k₂."""
     scene = own_matrices(np.diag([1.0, 1e15]), np.eye(2), [2.0, 1.0], [1.0, 1.0])
     np.testing.assert_allclose(solve(scene, form=form).x, [1.0, 1e-15], rtol=1e-14)
+
+
+def test_own_sparse_matrices_that_are_nearly_singular_are_refused_as_a_file_is() -> None:
+    """A chain of 2001 masses that a spring of 1e-12 N/mm holds to the ground."""
+    n = 2001
+    D = sp.diags_array([1.0, -1.0], offsets=[0, 1], shape=(n - 1, n))
+    K = sp.csc_array(D.T @ D + sp.csc_array(([1e-12], ([0], [0])), shape=(n, n)))
+    A = sp.csc_array(([1.0], ([0], [0])), shape=(n, 1))
+    with pytest.raises(InputError, match=r"cond\(K\), in balanced units"):
+        solve(own_matrices(K, A, np.zeros(n), [-1.0]), form="sparse")
