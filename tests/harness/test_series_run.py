@@ -22,7 +22,7 @@ from harness.results.schema import SERIES
 from harness.series import session as session_module
 from harness.series.load_case_source import GapCases
 from harness.series.run import summary
-from harness.series.session import Job, Result, SeriesSession
+from harness.series.session import Job, Result, SeriesOptions, SeriesSession
 from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.problem import Dual
@@ -113,16 +113,17 @@ def test_another_series_is_refused(change: tuple[str, str]) -> None:
     assert len(rows_of("mine")) == 3
 
 
+LIMITS = SeriesOptions()
 KILLED = "killed by SIGKILL, perhaps by the system because memory ran out"
 
 
 @pytest.mark.parametrize(
     ("end", "again"),
     [
-        ({"status": "time_limit", "time_limit_s": 9.0}, False),
-        ({"status": "time_limit", "time_limit_s": 8.0}, True),
-        ({"status": "memory_limit", "memory_limit_mib": 900}, False),
-        ({"status": "memory_limit", "memory_limit_mib": 800}, True),
+        ({"status": "time_limit", "time_limit_s": LIMITS.time_limit_s}, False),
+        ({"status": "time_limit", "time_limit_s": LIMITS.time_limit_s / 2}, True),
+        ({"status": "memory_limit", "memory_limit_mib": LIMITS.memory_limit_mib}, False),
+        ({"status": "memory_limit", "memory_limit_mib": LIMITS.memory_limit_mib // 2}, True),
         ({"status": "memory_limit"}, True),
         ({"status": "crashed", "message": "killed by SIGSEGV"}, False),
         ({"status": "crashed", "message": KILLED}, True),
@@ -132,7 +133,7 @@ KILLED = "killed by SIGKILL, perhaps by the system because memory ran out"
 def test_a_case_is_tried_again_if_its_cause_may_have_passed(
     end: dict[str, Any], again: bool, tmp_path: Path
 ) -> None:
-    command = "--cases", "3", "--time-limit", "9", "--memory-limit", "900", "--out", str(tmp_path)
+    command = "--cases", "3", "--out", str(tmp_path)
     series(*command)
     row = rows_of(str(tmp_path))[1]
     lost = {"case": 1, "gap_seed": row["gap_seed"], "verdict": "no_answer", "message": "", **end}
