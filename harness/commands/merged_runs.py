@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from harness.measurement.recorded_suite import SUITE
 from harness.measurement.suite_run import record_machine
 from harness.planning.suite import read_written
 from harness.results import records
@@ -13,7 +14,7 @@ from harness.results.row_validation import refuse_unreadable
 from harness.verification.reference_problem import PROBLEMS
 from problems.errors import InputError, read_all
 
-from .suite_runs import SUITE, report
+from .suite_runs import report
 
 
 def merge(names: Sequence[str], out: Path) -> Path:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.measurement.recorded_suite import SUITE
 from harness.measurement.scheduler import threads_per_worker
 from harness.measurement.suite_run import run as run_suite
 from harness.planning.overrides import Overrides, overridden
@@ -18,7 +19,6 @@ from problems.errors import InputError
 from problems.reporter import SILENT, Reporter
 
 AS_IT_IS = Overrides()
-SUITE = "suite.toml"
 
 
 @dataclass(frozen=True)

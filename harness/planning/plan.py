@@ -229,7 +229,7 @@ def of_key(plan: Sequence[Measurement], key: str) -> list[Measurement]:
         return [replace(chosen, entry=entry)]
     batched = chosen.entry.batched
     end = (chosen.case // (batched or 1) + 1) * (batched or 1)
-    same = (m for m in plan if (m.process, m.entry.batched) == (chosen.process, batched))
+    same = (m for m in plan if m.process == chosen.process)
     return [replace(m, entry=entry) for m in same if m.case is not None and m.case < end]
 
 

@@ -1,6 +1,6 @@
 """Judges an answer that another program has computed: x or λ from a .npz or .csv file."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -53,7 +53,7 @@ def judge_file(
         if name in answer and len(answer[name]) != size:
             allowed = f"{size} in the {form} form of {problem.scene.name}; name another form with --form"
             raise Incomparable.one(path, f"length of {name}", len(answer[name]), allowed)
-    refuse_other_places(path, "x" if "x" in answer else "lam", assembly)
+    refuse_other_places(path, answer, assembly)
     lam = answer.get("lam", np.full(assembly.m, np.nan))
     x = answer["x"] if "x" in answer else problem.prepared.recover(lam, problem.load)
     limit = problem.limit_mm(limit_mm)
@@ -87,7 +87,8 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
 
 
 def read_answer(path: Path) -> dict[str, Vector]:
-    """The vectors of a file by name: "x" (displacements) and "lam" (contact forces), or one of them.
+    """The vectors of a file by name: "x" (displacements) and "lam" (contact forces), or one of them, and the
+    PLACES of a .csv that has them.
 
     An .npz has arrays of the names in VECTORS, a .csv columns, as nodes.csv and contacts.csv of `solve`;
     never both names of one vector. Raises InputError.
@@ -114,33 +115,35 @@ def read_answer(path: Path) -> dict[str, Vector]:
         if len(wrong):
             allowed = f"must be a finite number; {len(wrong)} of {len(vector)} are not"
             raise InputError.one(path, f"{heading}[{wrong[0]}]", float(vector[wrong[0]]), allowed)
-        vectors[VECTORS[heading]] = vector
+        vectors[VECTORS.get(heading, heading)] = vector
     if not vectors or len(vectors) < len(arrays):
         allowed = "x or displacement_mm, lam or force_N: one of them alone"
         raise InputError.one(path, "names", list(arrays), allowed)
     return vectors
 
 
-def refuse_other_places(path: Path, name: str, assembly: Assembly) -> None:
+def refuse_other_places(path: Path, answer: Mapping[str, Vector], assembly: Assembly) -> None:
     """Raise InputError if a CSV file with x_mm and y_mm has its rows in another order than the scene."""
-    nodes = assembly.contact_nodes if name == "lam" else assembly.at_junction(assembly.nodes)
-    places = _columns(path, PLACES) if path.suffix.lower() == ".csv" else {}
-    if nodes is None or len(places) < len(PLACES) or len(places[PLACES[0]]) != len(nodes):
+    nodes = assembly.at_junction(assembly.nodes) if "x" in answer else assembly.contact_nodes
+    if nodes is None or not {*PLACES} <= answer.keys() or len(answer[PLACES[0]]) != len(nodes):
         return
-    told = np.column_stack([places[heading] for heading in PLACES])
+    told = np.column_stack([answer[heading] for heading in PLACES])
     away = abs(told - nodes).max(axis=1) > SAME_PLACE * np.ptp(nodes, axis=0).max()
     for k in np.flatnonzero(away)[:1]:
         allowed = f"the scene has {position(nodes[k], nodes)} there: rows in its order"
         raise InputError.one(path, f"row {k + 1}, place", position(told[k], nodes), allowed)
 
 
-def _columns(path: Path, wanted: Iterable[str] = VECTORS) -> dict[str, Vector]:
-    """The wanted columns of a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
+def _columns(path: Path) -> dict[str, Vector]:
+    """The columns of VECTORS and PLACES in a CSV file, by the rules of `problems.input.tables`.
+
+    Raises InputError.
+    """
     table = Cells.of(path, MIB, ())
     rows = table.rows()
     heads = ([cell.lstrip("# ") for cell in cells] for _, cells in rows)
     header = next((cells for cells in heads if not {*VECTORS}.isdisjoint(cells)), [])
-    names = [name for name in wanted if name in header]
+    names = [name for name in (*VECTORS, *PLACES) if name in header]
     if twice := [name for name in names if header.count(name) > 1]:
         raise InputError.one(path, "names", twice, "each heading once")
     at = [header.index(name) for name in names]
