@@ -13,6 +13,8 @@ C are the closed contacts. If C repeats itself, λ is the exact answer, up to ro
 instead; then it stops at the limit of contact sets.
 
 Only `solve` is required. All arrays that a solver is given are read-only and shared: copy before writing.
+Lengths and forces, and the tolerance with them, come multiplied by powers of two; for a joint in mm and N they
+hardly change.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from solvers.base import Answer, Batch, DualLoadCase, Problem, Solver, WarmStart
 
 
 class MySolver(Solver):
-    #: The forms that it takes: "dual" as above, "primal" min ½xᵀKx − fᵀx, Aᵀx ≤ g.
+    #: The forms that it takes: "dual" as above; "primal" min ½xᵀKx − fᵀx, Aᵀx ≤ g; "sparse", the same before
+    #: condensation.
     forms = ("dual",)
 
     #: If a package does the solving: its distribution's name, whose version goes into the rows.
