@@ -15,7 +15,7 @@ from problems.model.joint import Faults, Pair
 from problems.model.junction_terms import at_contacts
 from problems.model.surface_cells import cross
 
-NUDGE = 1e-6  # mm, to the left and below
+NUDGE = 1e-6  # mm: the places of nodes are rounded; of an outline, to the left and below
 Outline = Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=3, exclude_if=lambda some: not some)]
 
 
@@ -86,7 +86,7 @@ class Shims(ContactEffect, GapEffect):
         """
         if not self.outline:
             low, high = self.ranges.T
-            return np.asarray(((low <= places) & (places <= high)).all(axis=1))
+            return np.asarray(((low - NUDGE <= places) & (places <= high + NUDGE)).all(axis=1))
         corners, (low, high) = np.array(self.outline), joint.bounds
         edge, at = np.roll(corners, -1, axis=0) - corners, np.clip(places - NUDGE, low + NUDGE, high - NUDGE)
         above = at[:, None, 1] >= corners[:, 1]
@@ -97,7 +97,7 @@ class Shims(ContactEffect, GapEffect):
         """Where places (k, 2), mm, are on the longer range: 0 at its start, 1 at its stop."""
         axis = int(np.ptp(self.ranges, axis=1).argmax())
         start, stop = self.ranges[axis]
-        return np.asarray((places[:, axis] - start) / (stop - start))
+        return np.clip((places[:, axis] - start) / (stop - start), 0.0, 1.0)
 
     def gap(self, joint: AnyJoint) -> Vector:
         first, last = np.resize(self.thickness, 2)

@@ -194,6 +194,20 @@ def test_shims_fill_their_rectangle_borders_included() -> None:
     np.testing.assert_array_equal(g, expected)
 
 
+@pytest.mark.parametrize(("length", "count", "x"), [(120.0, 51, (7.2, 24.0)), (110.0, 101, (0.0, 6.6))])
+def test_borders_are_included_where_nodes_are_rounded(
+    length: float, count: int, x: tuple[float, float]
+) -> None:
+    joint = make_joint(PART, PART | {"name": "b"}, length=length, nodes=(count, 3))
+    step = length / (count - 1)
+    assert not {*x} - {0.0} <= {*joint.nodes[:, 0]}  # a border is beside its nodes, by rounding
+    even = Shims(kind="shims", thickness=0.3, x=x, y=(0, 120)).gap(joint).reshape(3, count)
+    first, last = round(x[0] / step), round(x[1] / step)
+    np.testing.assert_array_equal(np.flatnonzero(even[0]), np.arange(first, last + 1))
+    ramp = Shims(kind="shims", thickness=(0.1, 0.3), x=x, y=(0, 5)).gap(joint).reshape(3, count)[0]
+    assert -0.3 <= ramp.min() < ramp[first] == -0.1
+
+
 def test_shims_that_touch_fill_no_contact_twice() -> None:
     """Rectangles that share a border or a corner at a node are refused, outlines add up to an even sheet."""
 

@@ -358,6 +358,19 @@ def test_a_sparse_k_stays_sparse_in_the_sparse_form(tmp_path: Path) -> None:
     np.testing.assert_allclose(made.K.multiply(v), wanted, rtol=1e-12, atol=1e-9)
 
 
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+def test_matrices_of_other_contacts_have_another_key(form: Any, tmp_path: Path) -> None:
+    """The key names proven answers in the cache: K, f and g are the same, A is not."""
+    nodes = flat(np.array([[x, y] for y in (0.0, 40.0) for x in (0.0, 50.0, 100.0)]))
+    parts = [write_part(tmp_path, name, 50.0 * np.eye(6), nodes) for name in "abc"]
+    gap = {"kind": "initial_gap", "mean": 0.05}
+    pairs = [["a", "b"], ["b", "c"]], [["a", "b"], ["a", "c"]], [["b", "c"], ["a", "b"]]
+    scenes = [scene_from(parts, gap, contacts=some) for some in pairs]
+    tools = ({"kind": "rigid_tool", "part": part, "distance": 0.1} for part in "ab")
+    scenes += [scene_from(parts[:2], gap, tool) for tool in tools]
+    assert len({prepared(scene, form=form).key for scene in scenes}) == len(scenes)
+
+
 def test_a_random_gap_on_scattered_nodes_has_its_covariance(tmp_path: Path) -> None:
     random = np.random.default_rng(6)
     nodes = np.column_stack([random.uniform(0, 300, 40), random.uniform(0, 100, 40)])
