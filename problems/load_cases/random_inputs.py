@@ -218,7 +218,7 @@ def inputs_of(
         per_element, levels, bare = cast(re.Match[str], LAW.fullmatch(text)).groups()
         key, where = keys.get(name), f"{source} {name}"
         if key is None or name in [one.name for one in inputs]:
-            allowed = "one distribution of each key" if key else allowed_keys(keys)
+            allowed = "one distribution of each key" if key else allowed_keys(keys, stiffness)
             faults.append(Fault(source, "key", name, allowed))
         try:
             frozen = distribution(bare)
@@ -268,7 +268,7 @@ def random_inputs(
     stiffness : whether keys may change K.
     """
     if not isinstance(scene, JointScene):
-        raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}))
+        raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}, stiffness))
     scanned = gaps is not None and gaps.points is not None
     inputs, faults = inputs_of(scene, laws, stiffness, scanned)
     d = len(inputs) + bool(gaps)
