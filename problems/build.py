@@ -124,8 +124,8 @@ class GivenModel:
                 raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
         seconds = time.perf_counter() - start
         key = digest("sparse", scene.assembly_key, fingerprint([Path(__file__)], ("problems/input",)))
-        user_K = isinstance(scene, MatricesScene) or scene.by_user
-        return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, user_K)
+        refuses_singular = isinstance(scene, MatricesScene) or scene.refuses_singular
+        return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, refuses_singular)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K with dense blocks. Raises InputError if contacts depend on one another."""

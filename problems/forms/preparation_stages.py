@@ -31,7 +31,8 @@ class SparsePrepared(Prepared):
     Parameters
     ----------
     key : names K in the cache, where bounds proven for it are kept. model_s : seconds in which K was made.
-    source_of : gives the origin of "K" or "A", for messages. user_K : refuse K if it is nearly singular.
+    source_of : gives the origin of "K" or "A", for messages.
+    refuses_singular : whether K is refused if it is nearly singular.
     """
 
     def __init__(
@@ -40,13 +41,14 @@ class SparsePrepared(Prepared):
         key: str,
         model_s: float,
         source_of: SourceOf,
-        user_K: bool = False,
+        refuses_singular: bool = False,
         coarser: Callable[[], Assembly] | None = None,
     ) -> None:
         K = Stiffness(assembly.K.blocks, self._factor)
         notes = (*assembly.notes, ONE_OF_MANY) if assembly.dependent else assembly.notes
         super().__init__(replace(assembly, K=K, notes=notes), coarser=coarser)
-        self.key, self.model_s, self.source_of, self.user_K = key, model_s, source_of, user_K
+        self.key, self.model_s, self.source_of = key, model_s, source_of
+        self.refuses_singular = refuses_singular
 
     def _factor(self, K: Stiffness) -> None:
         nodes = self.assembly.nodes
@@ -56,7 +58,7 @@ class SparsePrepared(Prepared):
             where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[error.unknown])
             key, moves = f"x[{error.unknown}]{where}", "moves without a force"
             raise indefinite(self.source_of("K"), key, moves) from error
-        if self.user_K:
+        if self.refuses_singular:
             refuse_nearly_singular(K.blocks, self.source_of)
 
 
