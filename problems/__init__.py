@@ -1,4 +1,4 @@
 """Riveting problems: parts, condensation, effects, scenes and their matrices."""
 
-#: Of the distribution with its four packages; here because all of them may import it.
+#: The version of the distribution; it stands here because all of its packages may import it.
 __version__ = "0.4.0"

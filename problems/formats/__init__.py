@@ -29,7 +29,7 @@ DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 class Format:
     """A format of files, and the functions that read and write it.
 
-    description : the help text of `export --format`.
+    description : what is written, as `list formats` and `export` show it.
     suffixes : the suffixes of files to read; the first is that of the file written.
     write : writes a file, or a folder with a file per matrix if `is_folder`.
     read : returns the chosen matrices of a file by their names in it, a single one by the file's stem, and

@@ -115,7 +115,7 @@ def contradictions(K: sp.csr_array, sign: int = 1) -> list[tuple[int, int]]:
 
 
 def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequence[str] | None = None) -> None:
-    """Raise InputError if K (n, n), finite, is asymmetric, or has Abaqus' mark on its diagonal.
+    """Raise InputError if K (n, n), finite, is asymmetric, or has a zero or Abaqus' mark on its diagonal.
 
     name, rows : the names of the matrix and of its rows in messages.
     """

@@ -39,8 +39,10 @@ DIVIDED = "left out: its points act or change one by one, not as a pattern"
 
 @dataclass(frozen=True)
 class Input(Key):
-    """A key, its distribution as text and of scipy, the number of its elements, 0 without `each`, and of its
-    values, 0 if these are all of the distribution.
+    """A random key.
+
+    text, law : its distribution, as given and of scipy. elements : their number with `each`, else 0.
+    levels : N of `N of`, else 0. changes_K : whether each value has a K of its own.
     """
 
     text: str
@@ -126,7 +128,7 @@ class RandomInputs(LoadCases):
         return replace(self, scene=replace(self.scene, effects=tuple(effects)))
 
     def staged(self, scene: JointScene) -> JointScene:
-        """No spring has a random approach, which the loads have; those with a random preload have one."""
+        """The scene with 0 for each random approach, which the loads have, and 1 N for a random preload."""
         effects = list(scene.effects)
         for one in self.inputs:
             if isinstance(effects[one.effect], SpringEffect) and not one.changes_K:
@@ -139,7 +141,7 @@ class RandomInputs(LoadCases):
 
     @cached_property
     def part(self) -> JointScene:
-        """What acts, a scene without stages."""
+        """The scene that acts, without stages."""
         return self.stage or [*stage_scenes(self.scene).values()][-1]
 
     @cached_property
@@ -150,8 +152,9 @@ class RandomInputs(LoadCases):
 
     @cached_property
     def pieces(self) -> dict[int, list[tuple[list[int], Any]]]:
-        """What acts of each effect that changes, by its number in the scene, with the numbers of its elements
-        there; they are one by one where `each` is for a key that is no column.
+        """The acting elements of each effect that changes, with their effect, by its number in `scene`.
+
+        They are one by one where `each` is for a key that is no column.
         """
         pieces = {}
         for i, (effect, elements) in self.acting.items():

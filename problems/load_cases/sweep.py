@@ -30,7 +30,7 @@ OTHER = "what changes K would be another assembly"
 
 @dataclass(frozen=True)
 class Key:
-    """A number that changes f or g: its name, the index of its effect, and the keys that lead to it.
+    """A number of an effect: its name, the index of its effect, and the keys that lead to it.
 
     `points.x` and `points.y` are a shift of all points of an effect, mm; any other key is replaced.
     """

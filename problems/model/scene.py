@@ -89,7 +89,7 @@ class Scene(ABC):
 
     @property
     def output(self) -> Output:
-        """What an answer has besides displacements, gaps and forces; in no key."""
+        """The parts of an answer besides displacements, gaps and forces; in no key."""
         return GAPS_ALONE
 
     @property
@@ -128,7 +128,7 @@ class JointScene(Scene):
 
     @property
     def numbers(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
-        """`origin`, or that of a stage in which everything acts."""
+        """The number and the acting elements of each effect: `origin`, or if that is empty all elements."""
         counts = enumerate(effect.element_count(self.joint) for effect in self.effects)
         return self.origin or tuple((i, tuple(range(count))) for i, count in counts)
 

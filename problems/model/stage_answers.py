@@ -91,9 +91,9 @@ def locked(scene: JointScene, approaches: Vector) -> JointScene:
 
 
 def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
-    """What acts at the end of each stage, by its name: scenes without stages and approaches.
+    """The scene at the end of each stage, by its name, without stages and locked approaches.
 
-    The scene under "" if it has no stages.
+    The scene itself under "" if it has no stages.
     """
     if not scene.stages:
         return {"": scene}
