@@ -78,12 +78,17 @@ def models_of(scene: Scene) -> list[Model]:
     return models
 
 
-def shares_stiffness(scene: Scene, other: Scene) -> bool:
-    """Whether two joints have the same K; the first one then takes the model of the other."""
+def same_stiffness(scene: Scene, other: Scene) -> bool:
+    """Whether two scenes are joints with the same K."""
     if not (isinstance(scene, JointScene) and isinstance(other, JointScene)):
         return False
     keys = [Springs.of(one).key(one.assembly_key) for one in (scene, other)]
-    if same := keys[0] == keys[1]:
+    return keys[0] == keys[1]
+
+
+def adopts_model(scene: Scene, other: Scene) -> bool:
+    """Give a scene the model of another one if both have the same K; returns whether they have."""
+    if same := same_stiffness(scene, other):
         object.__setattr__(scene, "model", replace(cast(Any, model_of(other)), scene=scene))
     return same
 

@@ -21,7 +21,7 @@ from harness.solving.call_lock import in_turn
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
-from problems.build import load_case, prepared, shares_stiffness
+from problems.build import adopts_model, load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
@@ -186,7 +186,7 @@ class Explorer:
         self.data = self.sessions[-1].data
 
     def _opened(self, part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
-        shared = (one for one in self.sessions if shares_stiffness(part, one.scene))
+        shared = (one for one in self.sessions if adopts_model(part, one.scene))
         self.sessions.append(next(shared, None) or _Session(part, self.form))
         return lambda T: np.zeros((T.shape[1], 1)), None
 

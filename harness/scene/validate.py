@@ -13,7 +13,7 @@ from harness.terminal.docstrings import docstring
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import about, expected_error
-from problems.build import prepared, shares_stiffness
+from problems.build import prepared, same_stiffness
 from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
@@ -162,7 +162,7 @@ def _with_effects(table: Table, scene: JointScene) -> Table:
     if scene.stages:
         earlier: dict[str, JointScene] = {}
         for name, part in stage_scenes(scene).items():
-            like = next((first for first, one in earlier.items() if shares_stiffness(part, one)), None)
+            like = next((first for first, one in earlier.items() if same_stiffness(part, one)), None)
             earlier |= {name: part} if like is None else {}
             acts = ", ".join(_counted(effect, scene.joint) for effect in part.effects)
             table.add_row(f"stage {name}", acts + (f"; K of {like}" if like is not None else ""))

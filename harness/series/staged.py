@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from problems.build import load_case, shares_stiffness
+from problems.build import adopts_model, load_case
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
@@ -110,7 +110,7 @@ class OpenStages(Generic[S]):
         if (key := (part.key, part.origin)) not in self.stages:
             springs = Springs.of(part)
             bare = locked(part, np.zeros(len(springs.k)))
-            shared = (one.session for one in self.stages.values() if shares_stiffness(bare, one.scene))
+            shared = (one.session for one in self.stages.values() if adopts_model(bare, one.scene))
             session, load = next(shared, None) or self.make(bare), load_case(bare, self.form)
             self.stages[key] = OpenStage(bare, session, load.f, load.g - self.gap, springs)
         return self.stages[key]

@@ -13,7 +13,7 @@ from harness.planning.form_choice import form_of_stages
 from harness.results import records
 from harness.results.answer_files import read_answer
 from problems import storage
-from problems.build import load_case, prepared, shares_stiffness
+from problems.build import adopts_model, load_case, prepared
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -122,7 +122,7 @@ def open_stage(
     form : the form of the answers; in the sparse form, x has an entry per unknown of the model. like : a
     problem in this form whose matrices are taken, with their factors, if they are those of the scene.
     """
-    shared = like is not None and shares_stiffness(scene, like.scene)
+    shared = like is not None and adopts_model(scene, like.scene)
     data = like.prepared if like is not None and shared else prepared(scene, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
     return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
