@@ -32,7 +32,7 @@ from problems.input.bounded_types import valid_table
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import Elongations, locked, through
-from problems.model.stages import Plan
+from problems.model.stages import StagePlan
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import DualStart
 
@@ -98,7 +98,7 @@ class Settings:
             wrong = effect.faults(scene.joint, others)
             faults += [Fault(PAGE, f"{effect.kind}.{key}", value, allowed) for key, value, allowed in wrong]
         if not faults:
-            faults = [Fault(PAGE, *fault) for fault in Plan(made, scene.stages, scene.joint).faults()]
+            faults = [Fault(PAGE, *fault) for fault in StagePlan(made, scene.stages, scene.joint).faults()]
         if faults:
             raise InputError(faults)
         return tuple(made)

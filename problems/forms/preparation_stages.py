@@ -105,7 +105,7 @@ class DensePrepared(Prepared):
         return self.model_seconds | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
 
     def make_Q(self) -> Matrix:
-        return storage.load_or_make(str(self.key), self._make_schur)[0]["Q"]
+        return storage.load_or_make(str(self.key), self._make_compliance)[0]["Q"]
 
     def _open_factors(self, K: Stiffness) -> None:
         for k, block in enumerate(self.blocks):
@@ -137,7 +137,7 @@ class DensePrepared(Prepared):
         }
         return {f"U{k}": block.U for k, block in enumerate(self.blocks)}, facts
 
-    def _make_schur(self) -> storage.Entry:
+    def _make_compliance(self) -> storage.Entry:
         self.assembly.K.ensure_factored()
         self.reporter.building(Stage.Q)
         start = time.perf_counter()

@@ -23,7 +23,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import stage_scenes
-from problems.model.stages import Acting, Plan, of_effect
+from problems.model.stages import Acting, StagePlan, of_effect
 from problems.storage import digest
 
 from . import LoadCases
@@ -211,7 +211,7 @@ def inputs_of(
 ) -> tuple[list[Input], list[Fault]]:
     """The inputs of laws, and what is wrong with these. scanned : whether random gaps pass through a scan."""
     keys, loads, faults, inputs = keys_of(scene, stiffness), keys_of(scene), list[Fault](), list[Input]()
-    steps = Plan(scene.effects, scene.stages, scene.joint).steps
+    steps = StagePlan(scene.effects, scene.stages, scene.joint).steps
     fresh, sources = {number for step in steps for number, _ in step.fresh}, list[str]()
     if scanned:  # a scan has one correlation length
         keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}

@@ -19,7 +19,7 @@ from problems.forms.assembly import Matrix, Vector
 
 from .effect import SpringEffect
 from .scene import JointScene
-from .stages import Acting, Elements, Plan, acting_effects, of_effect
+from .stages import Acting, Elements, StagePlan, acting_effects, of_effect
 
 Answer = TypeVar("Answer")
 #: Of an answer x (n, k), mm: Tᵀx (r, k) for directions T (n, r).
@@ -48,7 +48,7 @@ def through(
         see `locked`; and its answer. A stage is solved again with the fasteners that it sets if these have a
         preload, or if it is the last one.
     """
-    joint, locks = scene.joint, _given(scene, cases)
+    joint, locks = scene.joint, _given_approaches(scene, cases)
 
     def assembled(step: Acting, elements: Elements) -> tuple[JointScene, Matrix]:
         rows = [at[:, of_effect(number, elements)].reshape(-1, cases) for number, at in locks.items()]
@@ -60,7 +60,7 @@ def through(
         except InputError as error:
             raise error.in_stage(step.name) from error
 
-    *_, last = steps = Plan(scene.effects, scene.stages, joint).steps
+    *_, last = steps = StagePlan(scene.effects, scene.stages, joint).steps
     for step in steps:
         fresh = frozenset((number, k) for number, k in step.fresh if number in locks)
         part, approaches = assembled(step, step.elements - fresh)
@@ -97,7 +97,7 @@ def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
     """
     if not scene.stages:
         return {"": scene}
-    steps = Plan(scene.effects, scene.stages, scene.joint).steps
+    steps = StagePlan(scene.effects, scene.stages, scene.joint).steps
     return {step.name: _scene(scene, step, step.elements) for step in steps}
 
 
@@ -108,7 +108,7 @@ def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
     return replace(scene, title=title, effects=tuple(acting.values()), stages=(), origin=origin)
 
 
-def _given(scene: JointScene, cases: int) -> dict[int, Matrix]:
+def _given_approaches(scene: JointScene, cases: int) -> dict[int, Matrix]:
     """The approaches that effects give, by the effect's number: (pairs, elements, springs, cases) mm."""
     approaches, joint = {}, scene.joint
     for number, effect in enumerate(scene.effects):

@@ -57,7 +57,7 @@ def acting_effects(effects: Sequence[Effect], elements: Elements, joint: AnyJoin
 
 
 @dataclass
-class Plan:
+class StagePlan:
     """The acting elements of each stage; `wrong` lists the entries of the stages that are wrong.
 
     effects, stages : those of a scene. joint : its joint. steps : one without a name if there are no stages.
