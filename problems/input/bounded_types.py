@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, StringCo
 from problems.errors import Fault, InputError
 
 LARGEST = 1e15  # in mm, N and units made of them
-MIB = 2**20
+MIB = 2**20  # bytes
 M = TypeVar("M", bound=BaseModel)
 
 
