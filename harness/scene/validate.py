@@ -22,7 +22,7 @@ from problems.model.effect import Effect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import stage_scenes
+from problems.model.stage_answers import last_scene, stage_scenes
 from problems.reporter import SILENT, Reporter
 from report.document.numbers import counted
 
@@ -105,8 +105,7 @@ def _matrices(scene: Scene, console: Console) -> None:
     choice = chosen_form(scene, FORMS, None)
     if choice.form == "sparse":
         console.print(f"Sparse form by default: {choice.why}.")
-    last = [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
-    assembly = prepared(last, form=choice.form).assembly
+    assembly = prepared(last_scene(scene), form=choice.form).assembly
     print_facts(scene.name, assembly, console)
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")

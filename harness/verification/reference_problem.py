@@ -19,7 +19,7 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import Elongations, locked, stage_scenes, through
+from problems.model.stage_answers import Elongations, last_scene, locked, through
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
@@ -151,7 +151,7 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
 
     code = storage.fingerprint([Path(__file__)], within=["harness/verification", "problems"])
     arrays, _ = storage.load_or_make(storage.digest("stages", scene.key, code), made)
-    return locked([*stage_scenes(scene).values()][-1], arrays["approaches"][:, 0])
+    return locked(last_scene(scene), arrays["approaches"][:, 0])
 
 
 def measurable(

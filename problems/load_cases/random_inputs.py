@@ -22,7 +22,7 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
 from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import stage_scenes
+from problems.model.stage_answers import last_scene
 from problems.model.stages import Acting, StagePlan, of_effect
 from problems.storage import digest
 
@@ -142,7 +142,7 @@ class RandomInputs(LoadCases):
     @cached_property
     def part(self) -> JointScene:
         """The scene that acts, without stages."""
-        return self.stage or [*stage_scenes(self.scene).values()][-1]
+        return self.stage or last_scene(self.scene)
 
     @cached_property
     def acting(self) -> dict[int, tuple[Any, Sequence[int]]]:

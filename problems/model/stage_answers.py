@@ -9,7 +9,7 @@ springs. Without a preload they are free of force in s, whose answer is then the
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar, overload
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +18,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 
 from .effect import SpringEffect
-from .scene import JointScene
+from .scene import JointScene, Scene
 from .stages import Acting, Elements, StagePlan, acting_effects, of_effect
 
 Answer = TypeVar("Answer")
@@ -99,6 +99,19 @@ def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
         return {"": scene}
     steps = StagePlan(scene.effects, scene.stages, scene.joint).steps
     return {step.name: _scene(scene, step, step.elements) for step in steps}
+
+
+@overload
+def last_scene(scene: JointScene) -> JointScene: ...
+
+
+@overload
+def last_scene(scene: Scene) -> Scene: ...
+
+
+def last_scene(scene: Scene) -> Scene:
+    """The scene at the end of the last stage, see `stage_scenes`; the scene itself if it has no stages."""
+    return [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
 
 
 def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
