@@ -18,6 +18,7 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.dependence import refuse_dependent
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.forms.prepared import Prepared
+from problems.input.matrix_entries import DENSEST
 from problems.model.effect import Effect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
     Model: TypeAlias = "JointModel | SuperelementModel | GivenModel"
 
-DENSEST = 0.25  # of a block's entries: a denser K gains nothing from the sparse form
 SMALL = 200  # unknowns up to which any K is taken
 
 

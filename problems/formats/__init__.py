@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input import matrix_files
-from problems.input.matrix_entries import refuse_no_stiffness, refuse_twice
+from problems.input.matrix_entries import DENSEST, refuse_no_stiffness, refuse_twice
 from problems.input.matrix_files import Choose
 from problems.input.user_matrices import NAMES, SMALL
 
@@ -22,7 +22,6 @@ from . import dmig, matrix_text, nastran
 Data = dict[str, Any]
 Labels = np.ndarray | None
 Read = dict[str, tuple[Any, Labels]]
-DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 
 
 @dataclass(frozen=True)

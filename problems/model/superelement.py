@@ -20,10 +20,11 @@ from pydantic import Field, field_validator, model_validator
 
 from problems import storage
 from problems.errors import InputError
-from problems.formats import DENSEST, read_stiffness
+from problems.formats import read_stiffness
 from problems.forms.assembly import Indices, Matrix
 from problems.input import matrix_files
 from problems.input.bounded_types import PLAIN, Name, regular_file
+from problems.input.matrix_entries import DENSEST
 from problems.input.user_matrices import SMALL, UNCHANGED, checked
 from problems.storage import fingerprint
 

@@ -19,10 +19,10 @@ import scipy.sparse as sp
 
 from problems import storage
 from problems.errors import Fault, InputError
-from problems.formats import DENSEST
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.dependence import is_dependent, refuse_dependent
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
+from problems.input.matrix_entries import DENSEST
 from problems.input.user_matrices import SMALL
 from problems.reporter import SILENT, Reporter
 from problems.stiffness import Vector, balanced_units
