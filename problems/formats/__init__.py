@@ -90,14 +90,6 @@ FORMATS = {
 }
 
 
-def read(path: Path) -> Data:
-    """Read the matrices of a file by their names in it; a nameless one has the file's stem as its name.
-
-    Raises InputError.
-    """
-    return {name: vector(M) if name in ("f", "g") else M for name, (M, _) in read_labelled(path).items()}
-
-
 def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tuple[Any, Labels, list[str]]:
     """Read one matrix of a file: the one called `matrix`, or else `name`, or the only one.
 
@@ -123,7 +115,10 @@ def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tu
 
 
 def read_labelled(path: Path, choose: Choose = list) -> Read:
-    """Read the chosen matrices of a file by their names, with the labels of their rows. Raises InputError."""
+    """Read the chosen matrices of a file by their names, with the labels of their rows.
+
+    A nameless one has the file's stem as its name. Raises InputError.
+    """
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
     format = format_of(path)
