@@ -41,8 +41,8 @@ DIVIDED = "left out: its points act or change one by one, not as a pattern"
 class Input(Key):
     """A random key.
 
-    text, law : its distribution, as given and of scipy. elements : their number with `each`, else 0.
-    levels : N of `N of`, else 0. changes_K : whether each value has a K of its own.
+    text, law : its distribution, as given and of scipy. elements : how many the effect has, with `each`; else
+    0. levels : N of `N of`, else 0. changes_K : whether each value has a K of its own.
     """
 
     text: str
