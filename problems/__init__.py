@@ -1,4 +1,8 @@
 """Riveting problems: parts, condensation, effects, scenes and their matrices."""
 
-#: Of the distribution with its four packages; here because all of them may import it.
+from pathlib import Path
+
+#: The version of the distribution; it stands here because all of its packages may import it.
 __version__ = "0.4.0"
+#: The folder that holds the project's packages.
+ROOT = Path(__file__).resolve().parents[1]

@@ -18,6 +18,7 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.dependence import refuse_dependent
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
 from problems.forms.prepared import Prepared
+from problems.input.matrix_entries import DENSEST
 from problems.model.effect import Effect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
     Model: TypeAlias = "JointModel | SuperelementModel | GivenModel"
 
-DENSEST = 0.25  # of a block's entries: a denser K gains nothing from the sparse form
 SMALL = 200  # unknowns up to which any K is taken
 
 
@@ -78,12 +78,17 @@ def models_of(scene: Scene) -> list[Model]:
     return models
 
 
-def shares_stiffness(scene: Scene, other: Scene) -> bool:
-    """Whether two joints have the same K; the first one then takes the model of the other."""
+def same_stiffness(scene: Scene, other: Scene) -> bool:
+    """Whether two scenes are joints with the same K."""
     if not (isinstance(scene, JointScene) and isinstance(other, JointScene)):
         return False
     keys = [Springs.of(one).key(one.assembly_key) for one in (scene, other)]
-    if same := keys[0] == keys[1]:
+    return keys[0] == keys[1]
+
+
+def adopts_model(scene: Scene, other: Scene) -> bool:
+    """Give a scene the model of another one if both have the same K; returns whether they have."""
+    if same := same_stiffness(scene, other):
         object.__setattr__(scene, "model", replace(cast(Any, model_of(other)), scene=scene))
     return same
 
@@ -124,8 +129,8 @@ class GivenModel:
                 raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
         seconds = time.perf_counter() - start
         key = digest("sparse", scene.assembly_key, fingerprint([Path(__file__)], ("problems/input",)))
-        user_K = isinstance(scene, MatricesScene) or scene.by_user
-        return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, user_K)
+        refuses_singular = isinstance(scene, MatricesScene) or scene.refuses_singular
+        return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, refuses_singular)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K with dense blocks. Raises InputError if contacts depend on one another."""

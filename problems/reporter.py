@@ -53,7 +53,17 @@ class Reporter:
         """
 
     def building(self, stage: Stage, fraction: float = 0.0, part: str = "") -> None:
-        """A stage begins or goes on, perhaps of one part."""
+        """Take note that a stage begins or goes on.
+
+        Parameters
+        ----------
+        stage : Stage
+            What is made.
+        fraction : float, optional
+            How much of it is done, 0 to 1.
+        part : str, optional
+            The part that it is made of.
+        """
         self.progress(f"{stage} {part}".rstrip(), fraction)
 
     def say(self, sentence: str) -> None:

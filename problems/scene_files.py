@@ -29,7 +29,7 @@ from problems.model.effect_tables import EffectTable
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import GAPS_ALONE, JointScene, MatricesScene, Output, Scene
-from problems.model.stages import Plan, Stage
+from problems.model.stages import Stage, StagePlan
 from problems.random_scenes import EXAMPLES, NAME, SUPERELEMENTS, draw_of, drawn_table
 
 from .errors import BACKSLASH, Fault, InputError
@@ -154,7 +154,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
             faults += table.faults(joint, None if stages else tables)
             faults += table.unknown_stages([stage.name for stage in stages]) if stages else ()
         if len(effects) == len(tables):
-            plan = Plan(effects, stages, joint)
+            plan = StagePlan(effects, stages, joint)
             faults += [Fault(str(path), *fault) for fault in plan.faults()]
             faults += [Fault(str(joint_path), *fault) for fault in plan.floating()]
     if faults or joint is None:

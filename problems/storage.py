@@ -28,6 +28,7 @@ import platformdirs
 from filelock import FileLock
 from numpy.typing import NDArray
 
+from problems import ROOT
 from problems.errors import InputError
 
 MANIFEST = "manifest.json"
@@ -143,8 +144,6 @@ def _repair(folder: Path) -> str:
     return f"the cache is damaged: delete {folder} and run again"
 
 
-#: The folder that holds the project's packages.
-ROOT = Path(__file__).resolve().parents[1]
 OWN_CODE = Path(__file__).read_bytes()
 
 

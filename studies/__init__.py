@@ -1,1 +1,1 @@
-"""What a maintainer runs on published results; no part of the installed packages."""
+"""Programs that a maintainer runs on published results; no part of the installed packages."""

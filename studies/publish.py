@@ -95,9 +95,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if failed else 0
 
 
-def measure(names: Sequence[str], digits: str) -> list[str]:
+def measure(names: Sequence[str], commit: str) -> list[str]:
     """Measure and publish what has no rows of this commit; returns the names that are not whole."""
-    due = [name for name in names if not is_of(rows_of(PUBLISHED / name), digits)]
+    due = [name for name in names if not is_of(rows_of(PUBLISHED / name), commit)]
     for name in due:
         if name not in SERIES:
             read_suite(name)  # refuses solvers that are not installed, now rather than in hours
@@ -105,14 +105,14 @@ def measure(names: Sequence[str], digits: str) -> list[str]:
     for k, name in enumerate(due):
         last = minutes(rows_of(PUBLISHED / name))
         print(f"{k + 1} of {len(due)}: {name}" + (f", {last:.0f} minutes the last time" if last else ""))
-        directory = STAGED / digits[:DIGITS] / name
+        directory = STAGED / commit[:DIGITS] / name
         if not directory.exists():
             begin(name, directory)
         words = ["series", *SERIES[name]] if name in SERIES else ["run", name]
         code = ended([*words, "--out", str(directory)])
         if code == INTERRUPTED:
             raise KeyboardInterrupt
-        if code or not is_of(rows_of(directory), digits):
+        if code or not is_of(rows_of(directory), commit):
             failed.append(name)
             continue
         if name == "paper":
@@ -162,10 +162,10 @@ def rows_of(directory: Path) -> Rows:
     return list(series_file.rows(directory)) or records.read(directory / records.MEASUREMENTS)
 
 
-def is_of(rows: Rows, digits: str) -> bool:
+def is_of(rows: Rows, commit: str) -> bool:
     """Whether there are rows, all without changes of the code, and of that commit if not in rounds."""
     of = {row.get("commit") for row in rows if not in_rounds(row)}
-    return of == {digits} and all(row.get("clean") is True for row in rows)
+    return of == {commit} and all(row.get("clean") is True for row in rows)
 
 
 def minutes(rows: Rows) -> float | None:
@@ -275,7 +275,7 @@ def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.
 
 
 def _seconds(series: Path) -> pd.Series[float]:
-    """Of each case, the proof of its error included."""
+    """The seconds of each case, the proof of its error included."""
     return pd.DataFrame(rows_of(series)).reindex(columns=["setup_s", "solve_s", "form_s"]).sum(axis=1)
 
 
@@ -291,10 +291,10 @@ def _title(directory: Path) -> str:
 
 
 def _commits(rows: Rows) -> str:
-    """In short; what is not known of one is said."""
+    """The commits of some rows, shortened; changes, and changes not known, are named."""
     words = {True: "", False: ", with changes", None: ", changes not known"}
     known = {(str(row.get("commit") or "not recorded")[:DIGITS], row.get("clean")) for row in rows}
-    return "; ".join(sorted(digits + words[clean] for digits, clean in known))
+    return "; ".join(sorted(commit + words[clean] for commit, clean in known))
 
 
 if __name__ == "__main__":

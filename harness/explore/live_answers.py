@@ -21,7 +21,7 @@ from harness.solving.call_lock import in_turn
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
-from problems.build import load_case, prepared, shares_stiffness
+from problems.build import adopts_model, load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
@@ -32,7 +32,7 @@ from problems.input.bounded_types import valid_table
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import Elongations, locked, through
-from problems.model.stages import Plan
+from problems.model.stages import StagePlan
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import DualStart
 
@@ -98,7 +98,7 @@ class Settings:
             wrong = effect.faults(scene.joint, others)
             faults += [Fault(PAGE, f"{effect.kind}.{key}", value, allowed) for key, value, allowed in wrong]
         if not faults:
-            faults = [Fault(PAGE, *fault) for fault in Plan(made, scene.stages, scene.joint).faults()]
+            faults = [Fault(PAGE, *fault) for fault in StagePlan(made, scene.stages, scene.joint).faults()]
         if faults:
             raise InputError(faults)
         return tuple(made)
@@ -186,7 +186,7 @@ class Explorer:
         self.data = self.sessions[-1].data
 
     def _opened(self, part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
-        shared = (one for one in self.sessions if shares_stiffness(part, one.scene))
+        shared = (one for one in self.sessions if adopts_model(part, one.scene))
         self.sessions.append(next(shared, None) or _Session(part, self.form))
         return lambda T: np.zeros((T.shape[1], 1)), None
 

@@ -24,6 +24,7 @@ from harness.results.records import Row
 
 from .child_process import end_children
 
+#: As Python names it, links not resolved: so begin the paths that processes print.
 ROOT = Path(__file__).parents[2]
 POLL_S = 0.05
 STDERR_TAIL = 2000  # bytes

@@ -19,6 +19,7 @@ from problems.build import models_of
 from problems.errors import InputError
 from problems.forms import DENSE_FORMS, Form, default_form
 from problems.forms.assembly import Assembly
+from problems.input.bounded_types import MIB
 from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from problems.build import Model
 
 SMALL_MIB = 100.0  # of dense matrices, per load case
-MIB = 2**20
 PROCESS_MIB = 150  # without matrices
 MODEL_BYTES = 1500  # while K̂ is assembled, per unknown; measured at n = 4386 and 11308
 BYTES_PER_ENTRY = 200  # of a given K and its copies in sparse storage

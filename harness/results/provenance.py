@@ -12,13 +12,11 @@ from typing import Any
 
 import psutil
 
-from problems import __version__
+from problems import ROOT, __version__
 
 from .schema import Provenance
 
 PACKAGES = ("rivetbench", "numpy", "scipy", "qpsolvers", "osqp", "clarabel", "proxsuite", "piqp")
-#: The folder that holds the project's packages.
-ROOT = Path(__file__).resolve().parents[2]
 #: The code that can change a row; the report only shows rows.
 CODE = ("problems", "solvers", "harness", "pyproject.toml")
 #: Tracked in a work tree of this project; a tree that merely contains an installed copy tracks neither.

@@ -22,7 +22,7 @@ from problems.input.matrix_files import damage
 from problems.input.tables import Cells, doubt, is_stray, number
 from report.document.numbers import position
 
-MIB = 1024
+LARGEST_MIB = 1024
 #: The vectors of an answer, by their names in a file.
 VECTORS = {"x": "x", "displacement_mm": "x", "lam": "lam", "force_N": "lam"}
 PLACES = ("x_mm", "y_mm")
@@ -95,7 +95,7 @@ def read_answer(path: Path) -> dict[str, Vector]:
     """
     if path.suffix.lower() not in (".npz", ".csv"):
         raise InputError.one(path, "suffix", path.suffix, ALLOWED)
-    regular_file(path, "file", MIB)
+    regular_file(path, "file", LARGEST_MIB)
     try:
         if path.suffix.lower() == ".csv":
             arrays: Mapping[str, Any] = _columns(path)
@@ -139,7 +139,7 @@ def _columns(path: Path) -> dict[str, Vector]:
 
     Raises InputError.
     """
-    table = Cells.of(path, MIB, ())
+    table = Cells.of(path, LARGEST_MIB, ())
     rows = table.rows()
     heads = ([cell.lstrip("# ") for cell in cells] for _, cells in rows)
     header = next((cells for cells in heads if not {*VECTORS}.isdisjoint(cells)), [])

@@ -13,7 +13,7 @@ from harness.terminal.docstrings import docstring
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import about, expected_error
-from problems.build import prepared, shares_stiffness
+from problems.build import prepared, same_stiffness
 from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
@@ -22,7 +22,7 @@ from problems.model.effect import Effect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import stage_scenes
+from problems.model.stage_answers import last_scene, stage_scenes
 from problems.reporter import SILENT, Reporter
 from report.document.numbers import counted
 
@@ -105,8 +105,7 @@ def _matrices(scene: Scene, console: Console) -> None:
     choice = chosen_form(scene, FORMS, None)
     if choice.form == "sparse":
         console.print(f"Sparse form by default: {choice.why}.")
-    last = [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
-    assembly = prepared(last, form=choice.form).assembly
+    assembly = prepared(last_scene(scene), form=choice.form).assembly
     print_facts(scene.name, assembly, console)
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
@@ -162,7 +161,7 @@ def _with_effects(table: Table, scene: JointScene) -> Table:
     if scene.stages:
         earlier: dict[str, JointScene] = {}
         for name, part in stage_scenes(scene).items():
-            like = next((first for first, one in earlier.items() if shares_stiffness(part, one)), None)
+            like = next((first for first, one in earlier.items() if same_stiffness(part, one)), None)
             earlier |= {name: part} if like is None else {}
             acts = ", ".join(_counted(effect, scene.joint) for effect in part.effects)
             table.add_row(f"stage {name}", acts + (f"; K of {like}" if like is not None else ""))

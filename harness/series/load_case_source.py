@@ -17,8 +17,9 @@ from problems.load_cases.random_gaps import number_faults, random_gaps
 from problems.load_cases.random_inputs import random_inputs
 from problems.load_cases.scan_modes import VARIANCE, scan_modes
 from problems.model.scene import JointScene, Scene
+from problems.model.stage_answers import last_scene
 
-from .staged import last_scene, refuse_staged_gaps
+from .staged import refuse_staged_gaps
 
 RANDOM = 100  # cases, if no number is given
 #: The options for the field of the gap, and the keys that are the same.

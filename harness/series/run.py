@@ -27,11 +27,11 @@ from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
+from problems.model.stage_answers import last_scene
 from report.document.numbers import counted
 
 from .executors import results_of
 from .session import Job, Result
-from .staged import last_scene
 
 MAX_FAULTS = 10  # named at once
 MISSING, OPEN, KEPT = range(3)  # a case: without a row, to be tried again, with its row

@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from problems.build import load_case, shares_stiffness
+from problems.build import adopts_model, load_case
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
@@ -21,16 +21,11 @@ from problems.load_cases import REPLACED, LoadCases
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.springs import Springs
-from problems.model.stage_answers import Elongations, locked, stage_scenes, through
+from problems.model.stage_answers import Elongations, last_scene, locked, stage_scenes, through
 
 from .session import BLOCK, Job, Result, SeriesSession
 
 S = TypeVar("S")
-
-
-def last_scene(scene: Scene) -> Scene:
-    """What acts in the last stage of a scene, or the scene if it has no stages."""
-    return [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
 
 
 def refuse_staged_gaps(scene: Scene) -> None:
@@ -110,7 +105,7 @@ class OpenStages(Generic[S]):
         if (key := (part.key, part.origin)) not in self.stages:
             springs = Springs.of(part)
             bare = locked(part, np.zeros(len(springs.k)))
-            shared = (one.session for one in self.stages.values() if shares_stiffness(bare, one.scene))
+            shared = (one.session for one in self.stages.values() if adopts_model(bare, one.scene))
             session, load = next(shared, None) or self.make(bare), load_case(bare, self.form)
             self.stages[key] = OpenStage(bare, session, load.f, load.g - self.gap, springs)
         return self.stages[key]
@@ -123,7 +118,6 @@ class StagedSession:
         assert isinstance(job.scene, JointScene)
         self.job, self.scene = job, job.cases.staged(job.scene)
         last = last_scene(self.scene)
-        assert isinstance(last, JointScene)
         self.stages = OpenStages(last, job.form, lambda part: SeriesSession(replace(job, scene=part)))
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:

@@ -23,7 +23,6 @@ from harness.scene.scene_file import edited, file_of
 from harness.scene.solution import Source, load_scene
 from harness.scene.stress import refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
-from harness.series.staged import last_scene
 from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
 from problems.effects.shims import Shims
@@ -34,6 +33,7 @@ from problems.load_cases.random_inputs import RandomInputs
 from problems.model.effect import SpringEffect
 from problems.model.positions import Positions
 from problems.model.scene import JointScene
+from problems.model.stage_answers import last_scene
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import scene_of
 from problems.storage import digest
@@ -159,7 +159,6 @@ def shim(
     if faults or not isinstance(read, JointScene):
         raise InputError(faults)
     bare = last_scene(read)
-    assert isinstance(bare, JointScene)
     if allow_stress is not None:
         refuse_unusable(allow_stress, bare)
     there = patches_of(bare.joint, None if patches is None else str(patches))

@@ -13,13 +13,13 @@ from harness.planning.form_choice import form_of_stages
 from harness.results import records
 from harness.results.answer_files import read_answer
 from problems import storage
-from problems.build import load_case, prepared, shares_stiffness
+from problems.build import adopts_model, load_case, prepared
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import Elongations, locked, stage_scenes, through
+from problems.model.stage_answers import Elongations, last_scene, locked, through
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
@@ -122,7 +122,7 @@ def open_stage(
     form : the form of the answers; in the sparse form, x has an entry per unknown of the model. like : a
     problem in this form whose matrices are taken, with their factors, if they are those of the scene.
     """
-    shared = like is not None and shares_stiffness(scene, like.scene)
+    shared = like is not None and adopts_model(scene, like.scene)
     data = like.prepared if like is not None and shared else prepared(scene, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
     return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
@@ -151,7 +151,7 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
 
     code = storage.fingerprint([Path(__file__)], within=["harness/verification", "problems"])
     arrays, _ = storage.load_or_make(storage.digest("stages", scene.key, code), made)
-    return locked([*stage_scenes(scene).values()][-1], arrays["approaches"][:, 0])
+    return locked(last_scene(scene), arrays["approaches"][:, 0])
 
 
 def measurable(

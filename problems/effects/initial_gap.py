@@ -26,13 +26,13 @@ class RandomField(Table):
 
 
 class InitialGap(ContactEffect, GapEffect):
-    """g = mean + sd · Lx Z Lyᵀ in mm, Z standard normal, at every contact.
+    """g += mean + sd · Ly Z Lx in mm, Z standard normal, at every contact.
 
-    The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
-    roots Lx and Ly of two one-dimensional correlation matrices; it is met to some 1e-10 of its largest
-    eigenvalue. Its grid is that of the contacts; if they have none, one of six lines or more per correlation
-    length is interpolated by cubic splines. A negative gap is an overclosure. Each contact has a random field
-    of its own.
+    The covariance sd² exp(−r² / 2ℓ²) is separable, so that the field needs only the symmetric square roots
+    Lx and Ly of two correlation matrices; the field meets the covariance to some 1e-10 of its largest
+    eigenvalue. The field is drawn on the grid of the contacts; contacts off a grid interpolate one of six
+    lines or more per correlation length by cubic splines. A negative gap is an overclosure. Each contact pair
+    has a random field of its own.
     """
 
     mean: Annotated[Finite, "mm"]

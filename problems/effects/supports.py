@@ -14,9 +14,9 @@ from problems.model.plate import Plate
 
 
 class Supports(StiffnessEffect):
-    """K += stiffness · Σ e eᵀ with e·(degrees of freedom) the deflection at a point.
+    """K += stiffness_per_point · Σ e eᵀ, e·(degrees of freedom) the deflection at a point.
 
-    points in mm, on the part; stiffness in N/mm.
+    points in mm, on the part; stiffness_per_point in N/mm.
     """
 
     points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), "mm"]

@@ -28,7 +28,7 @@ class ThermalBending(PartLoadEffect):
         plate = model.plate
         f = np.zeros(plate.size)
         for sign, thickness, (x, x_bend), (y, y_bend) in model.areas():
-            kappa = self.expansion * self.difference / thickness
+            (kappa,) = self.free_curvature(np.array([thickness]))
             moment = replace(plate, thickness=thickness).rigidity * (1 + plate.poisson) * kappa
             f -= sign * moment * (np.kron(y, x_bend) + np.kron(y_bend, x))
         return f

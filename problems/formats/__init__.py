@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input import matrix_files
-from problems.input.matrix_entries import refuse_no_stiffness, refuse_twice
+from problems.input.matrix_entries import DENSEST, refuse_no_stiffness, refuse_twice
 from problems.input.matrix_files import Choose
 from problems.input.user_matrices import NAMES, SMALL
 
@@ -22,14 +22,13 @@ from . import dmig, matrix_text, nastran
 Data = dict[str, Any]
 Labels = np.ndarray | None
 Read = dict[str, tuple[Any, Labels]]
-DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 
 
 @dataclass(frozen=True)
 class Format:
     """A format of files, and the functions that read and write it.
 
-    description : the help text of `export --format`.
+    description : what is written, as `list formats` and `export` show it.
     suffixes : the suffixes of files to read; the first is that of the file written.
     write : writes a file, or a folder with a file per matrix if `is_folder`.
     read : returns the chosen matrices of a file by their names in it, a single one by the file's stem, and
@@ -91,14 +90,6 @@ FORMATS = {
 }
 
 
-def read(path: Path) -> Data:
-    """Read the matrices of a file by their names in it; a nameless one has the file's stem as its name.
-
-    Raises InputError.
-    """
-    return {name: vector(M) if name in ("f", "g") else M for name, (M, _) in read_labelled(path).items()}
-
-
 def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tuple[Any, Labels, list[str]]:
     """Read one matrix of a file: the one called `matrix`, or else `name`, or the only one.
 
@@ -124,7 +115,10 @@ def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tu
 
 
 def read_labelled(path: Path, choose: Choose = list) -> Read:
-    """Read the chosen matrices of a file by their names, with the labels of their rows. Raises InputError."""
+    """Read the chosen matrices of a file by their names, with the labels of their rows.
+
+    A nameless one has the file's stem as its name. Raises InputError.
+    """
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
     format = format_of(path)

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input.matrix_entries import from_entries
-from problems.input.matrix_files import MIB, Choose
+from problems.input.matrix_files import LARGEST_MIB, Choose
 from problems.input.text_files import read_text
 
 OF_PROBLEM = {"F": "f", "G": "g"}
@@ -135,7 +135,7 @@ def _over(
 def _cards(path: Path) -> dict[str, Cards]:
     """The matrices of a file by their names, in capitals. Raises InputError."""
     matrices: dict[str, Cards] = {}
-    text = read_text(path, "file", MIB)
+    text = read_text(path, "file", LARGEST_MIB)
     if included := INCLUDE.search(text):
         line = text.count("\n", 0, included.start()) + 1
         allowed = "is not followed: give the file that holds the cards"

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input.matrix_entries import from_entries, mirrored, one_sided, read_entries
-from problems.input.matrix_files import BANNER, MIB, Choose, read_mtx
+from problems.input.matrix_files import BANNER, LARGEST_MIB, Choose, read_mtx
 from problems.input.text_files import read_bytes
 
 NORMAL = 3  # the degree of freedom under which displacements are written to Abaqus
@@ -28,7 +28,7 @@ ASK = "*MATRIX OUTPUT, STIFFNESS, FORMAT=MATRIX INPUT or COORDINATE: ask Abaqus 
 
 
 def is_matrix_market(path: Path) -> bool:
-    start = read_bytes(path, "file", MIB)[: len(BANNER)]
+    start = read_bytes(path, "file", LARGEST_MIB)[: len(BANNER)]
     return start.decode("latin-1").lower() == BANNER
 
 
@@ -72,7 +72,7 @@ def read_abaqus(path: Path, choose: Choose) -> dict[str, tuple[sp.csr_array, np.
 
 
 def _read(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
-    content = read_bytes(path, "file", MIB)
+    content = read_bytes(path, "file", LARGEST_MIB)
     if element := ELEMENT.search(content):
         number, line = content.count(b"\n", 0, element.start()) + 1, element[0].decode("latin-1")
         allowed = f"is of a user element; what is read is {ASK}"

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input.matrix_entries import mirrored, one_sided
-from problems.input.matrix_files import MIB, Choose
+from problems.input.matrix_files import LARGEST_MIB, Choose
 from problems.input.text_files import WIDE, read_bytes
 
 OF_PROBLEM = {"F": "f", "G": "g"}
@@ -63,7 +63,7 @@ def _plain(path: Path, folder: Path) -> Path:
         start = file.read(4)
     if start.count(0) > 2 and not start.startswith((GZIP, *WIDE)):  # two: UTF-16 without a mark
         return path
-    content = read_bytes(path, "file", MIB)
+    content = read_bytes(path, "file", LARGEST_MIB)
     if 0 in content[:4]:
         raise InputError.one(path, "file", "compressed binary", "binary OUTPUT4 not compressed: gunzip it")
     copy, width, lines = folder / "text.op4", 0, []

@@ -31,7 +31,8 @@ class SparsePrepared(Prepared):
     Parameters
     ----------
     key : names K in the cache, where bounds proven for it are kept. model_s : seconds in which K was made.
-    source_of : gives the origin of "K" or "A", for messages. user_K : refuse K if it is nearly singular.
+    source_of : gives the origin of "K" or "A", for messages.
+    refuses_singular : whether K is refused if it is nearly singular.
     """
 
     def __init__(
@@ -40,13 +41,14 @@ class SparsePrepared(Prepared):
         key: str,
         model_s: float,
         source_of: SourceOf,
-        user_K: bool = False,
+        refuses_singular: bool = False,
         coarser: Callable[[], Assembly] | None = None,
     ) -> None:
         K = Stiffness(assembly.K.blocks, self._factor)
         notes = (*assembly.notes, ONE_OF_MANY) if assembly.dependent else assembly.notes
         super().__init__(replace(assembly, K=K, notes=notes), coarser=coarser)
-        self.key, self.model_s, self.source_of, self.user_K = key, model_s, source_of, user_K
+        self.key, self.model_s, self.source_of = key, model_s, source_of
+        self.refuses_singular = refuses_singular
 
     def _factor(self, K: Stiffness) -> None:
         nodes = self.assembly.nodes
@@ -56,7 +58,7 @@ class SparsePrepared(Prepared):
             where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[error.unknown])
             key, moves = f"x[{error.unknown}]{where}", "moves without a force"
             raise indefinite(self.source_of("K"), key, moves) from error
-        if self.user_K:
+        if self.refuses_singular:
             refuse_nearly_singular(K.blocks, self.source_of)
 
 
@@ -103,7 +105,7 @@ class DensePrepared(Prepared):
         return self.model_seconds | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
 
     def make_Q(self) -> Matrix:
-        return storage.load_or_make(str(self.key), self._make_schur)[0]["Q"]
+        return storage.load_or_make(str(self.key), self._make_compliance)[0]["Q"]
 
     def _open_factors(self, K: Stiffness) -> None:
         for k, block in enumerate(self.blocks):
@@ -135,7 +137,7 @@ class DensePrepared(Prepared):
         }
         return {f"U{k}": block.U for k, block in enumerate(self.blocks)}, facts
 
-    def _make_schur(self) -> storage.Entry:
+    def _make_compliance(self) -> storage.Entry:
         self.assembly.K.ensure_factored()
         self.reporter.building(Stage.Q)
         start = time.perf_counter()

@@ -22,7 +22,7 @@ from .compliance import (
     of_products,
 )
 
-MIB = 2**20
+MIB = 2**20  # bytes
 EPS = float(np.finfo(float).eps)
 RESIDUAL_ROUNDING = 32  # of ε: five are usual, whatever the size
 

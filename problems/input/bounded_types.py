@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, StringCo
 from problems.errors import Fault, InputError
 
 LARGEST = 1e15  # in mm, N and units made of them
-MIB = 2**20
+MIB = 2**20  # bytes
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -26,7 +26,7 @@ def _no_other(value: object) -> object:
     return value
 
 
-#: Of a number: text and truth values are none.
+#: The validator of a number: text and truth values are refused.
 PLAIN = BeforeValidator(_no_other)
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False), PLAIN]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False), PLAIN]

@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Indices
 
+DENSEST = 0.25  # of K's entries: a denser K gains nothing from sparse storage
 SYMMETRY = 1e-10  # largest |K_ij − K_ji| / √(K_ii K_jj) attributed to rounding
 HELD = 1e36  # N/mm, what Abaqus writes on the diagonal for a degree of freedom that is held
 Place = Callable[[int], str]
@@ -115,7 +116,7 @@ def contradictions(K: sp.csr_array, sign: int = 1) -> list[tuple[int, int]]:
 
 
 def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequence[str] | None = None) -> None:
-    """Raise InputError if K (n, n), finite, is asymmetric, or has Abaqus' mark on its diagonal.
+    """Raise InputError if K (n, n), finite, is asymmetric, or has a zero or Abaqus' mark on its diagonal.
 
     name, rows : the names of the matrix and of its rows in messages.
     """

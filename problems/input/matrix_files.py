@@ -21,7 +21,7 @@ from .text_files import read_bytes
 
 NUMBERS, TEXT = [*"fiubc"], [*"US"]  # kinds of the entries of arrays
 PARTS = ("data", "indices", "indptr", "shape")
-MIB = 16_384  # of a text file of one matrix
+LARGEST_MIB = 16_384  # of a text file of one matrix
 LARGEST_SIZE = 10**8  # rows or columns
 KINDS = {"real": float, "double": float, "integer": np.int64, "unsigned-integer": np.uint64}
 #: By the symmetry in the header, the sign with which (i, j) stands for (j, i), too.
@@ -128,7 +128,7 @@ def mtx_header(path: Path) -> tuple[list[str], list[int], int, bytes]:
 
     Raises InputError.
     """
-    lines, number, text, words = io.BytesIO(read_bytes(path, "file", MIB)), 1, "", None
+    lines, number, text, words = io.BytesIO(read_bytes(path, "file", LARGEST_MIB)), 1, "", None
     allowed = "the header is %%MatrixMarket matrix LAYOUT FIELD SYMMETRY"
     for number, line in enumerate(lines, start=1):
         text = line.decode("latin-1").strip()

@@ -1,7 +1,7 @@
 """Ladders: problems that grow harder rung by rung, to see where a solver fails and whether it reports that.
 
-A rung is a scene. Each file of this folder may have three tables of ladders by name; a ladder is a table of
-rungs by name, the easiest first, and a rung is a function that makes the same scene at every call:
+A rung is a scene. Each file of this folder may have some of four tables of ladders by name; a ladder is a
+table of rungs by name, the easiest first, and a rung is a function that makes the same scene at every call:
 
     RUNGS        hard/<ladder>/<rung>
     FULL_SIZE    hard-full/<ladder>/<n>-<rung>, at the sizes of the paper: n = 4386, 6112 and 11308

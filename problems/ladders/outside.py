@@ -139,19 +139,19 @@ def _distance(line: Vector) -> Matrix:
     return np.minimum.outer(to_edge, to_edge)
 
 
-def exact(at: Matrix) -> Vector:
+def exact_membrane(at: Matrix) -> Vector:
     """u of the hemisphere at points (n, 2)."""
     r = np.hypot(*at.T)
     inside = np.sqrt(np.maximum(1 - r**2, 0.0))
     return np.where(r <= FREE, inside, FREE**2 / np.sqrt(1 - FREE**2) * np.log(2 / np.maximum(r, FREE)))
 
 
-def alone(cells: int) -> Vector:
+def bare_membrane(cells: int) -> Vector:
     """w at the inner nodes: the membrane without the hemisphere."""
     line, size = np.linspace(-2.0, 2.0, cells + 1), cells - 1
     f = np.zeros((size, size))
     for edge in (0, -1):
-        beyond = exact(np.column_stack([np.full(size, line[edge]), line[1:-1]]))
+        beyond = exact_membrane(np.column_stack([np.full(size, line[edge]), line[1:-1]]))
         f[edge] += beyond
         f[:, edge] += beyond
     return np.asarray(spsolve(five_point(size), f.ravel()))
@@ -163,7 +163,7 @@ def _hemisphere(cells: int) -> Scene:
     covered = np.flatnonzero((at**2).sum(axis=1) < 1)
 
     def make() -> ManufacturedProblem:
-        lowest = np.sqrt(1 - (at[covered] ** 2).sum(axis=1)) - alone(cells)[covered]
+        lowest = np.sqrt(1 - (at[covered] ** 2).sum(axis=1)) - bare_membrane(cells)[covered]
         return bounded(five_point(line.size), np.zeros(len(at)), at, -1.0, lowest, covered)
 
     return membrane(f"A membrane over a hemisphere, {cells} × {cells} cells", len(at), make, len(covered))

@@ -7,8 +7,8 @@ R. Glowinski, Numerical Methods for Nonlinear Variational Problems (1984).
 
 block      a block of cubes, held below, whose upper face is pressed against a rough rigid surface
 
-N. Kikuchi and J. T. Oden, Contact Problems in Elasticity (1988). The harder, the finer is the relief of the
-obstacle. Loads and approaches are drawn, so that few contacts close, or almost all.
+N. Kikuchi and J. T. Oden, Contact Problems in Elasticity (1988). The harder the problem, the finer the relief
+of its obstacle. Loads and approaches are drawn, so that few contacts close, or almost all.
 
 Trilinear elements on a product grid have a stiffness of products of ∫φφ, ∫φ'φ and ∫φ'φ' of one direction:
 

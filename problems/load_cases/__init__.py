@@ -1,4 +1,4 @@
-"""Many load cases on one assembly, f and g, made on demand: listed, random gaps, measured gaps, sweeps."""
+"""Many load cases on one assembly, f and g, made on demand: lists, random or measured gaps, scans, keys."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

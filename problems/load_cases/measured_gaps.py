@@ -164,5 +164,5 @@ def _read(path: Path, m: int, options: TableOptions, labels: Sequence[int]) -> M
         return gaps
     except InputError:
         raise
-    except Exception as error:  # and zipfile raise their own kinds
+    except Exception as error:  # numpy and zipfile raise kinds of their own
         raise InputError.one(path, "file", damage(error), "a readable table of numbers") from error

@@ -22,8 +22,8 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
 from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, Scene
-from problems.model.stage_answers import stage_scenes
-from problems.model.stages import Acting, Plan, of_effect
+from problems.model.stage_answers import last_scene
+from problems.model.stages import Acting, StagePlan, of_effect
 from problems.storage import digest
 
 from . import LoadCases
@@ -39,8 +39,10 @@ DIVIDED = "left out: its points act or change one by one, not as a pattern"
 
 @dataclass(frozen=True)
 class Input(Key):
-    """A key, its distribution as text and of scipy, the number of its elements, 0 without `each`, and of its
-    values, 0 if these are all of the distribution.
+    """A random key.
+
+    text, law : its distribution, as given and of scipy. elements : how many the effect has, with `each`; else
+    0. levels : N of `N of`, else 0. changes_K : whether each value has a K of its own.
     """
 
     text: str
@@ -126,7 +128,7 @@ class RandomInputs(LoadCases):
         return replace(self, scene=replace(self.scene, effects=tuple(effects)))
 
     def staged(self, scene: JointScene) -> JointScene:
-        """No spring has a random approach, which the loads have; those with a random preload have one."""
+        """The scene with 0 for each random approach, which the loads have, and 1 N for a random preload."""
         effects = list(scene.effects)
         for one in self.inputs:
             if isinstance(effects[one.effect], SpringEffect) and not one.changes_K:
@@ -139,8 +141,8 @@ class RandomInputs(LoadCases):
 
     @cached_property
     def part(self) -> JointScene:
-        """What acts, a scene without stages."""
-        return self.stage or [*stage_scenes(self.scene).values()][-1]
+        """The scene that acts, without stages."""
+        return self.stage or last_scene(self.scene)
 
     @cached_property
     def acting(self) -> dict[int, tuple[Any, Sequence[int]]]:
@@ -150,8 +152,9 @@ class RandomInputs(LoadCases):
 
     @cached_property
     def pieces(self) -> dict[int, list[tuple[list[int], Any]]]:
-        """What acts of each effect that changes, by its number in the scene, with the numbers of its elements
-        there; they are one by one where `each` is for a key that is no column.
+        """The acting elements of each effect that changes, with their effect, by its number in `scene`.
+
+        They are one by one where `each` is for a key that is no column.
         """
         pieces = {}
         for i, (effect, elements) in self.acting.items():
@@ -208,7 +211,7 @@ def inputs_of(
 ) -> tuple[list[Input], list[Fault]]:
     """The inputs of laws, and what is wrong with these. scanned : whether random gaps pass through a scan."""
     keys, loads, faults, inputs = keys_of(scene, stiffness), keys_of(scene), list[Fault](), list[Input]()
-    steps = Plan(scene.effects, scene.stages, scene.joint).steps
+    steps = StagePlan(scene.effects, scene.stages, scene.joint).steps
     fresh, sources = {number for step in steps for number, _ in step.fresh}, list[str]()
     if scanned:  # a scan has one correlation length
         keys = {name: key for name, key in keys.items() if key.path[-1] != "correlation_length"}
@@ -218,7 +221,7 @@ def inputs_of(
         per_element, levels, bare = cast(re.Match[str], LAW.fullmatch(text)).groups()
         key, where = keys.get(name), f"{source} {name}"
         if key is None or name in [one.name for one in inputs]:
-            allowed = "one distribution of each key" if key else allowed_keys(keys)
+            allowed = "one distribution of each key" if key else allowed_keys(keys, stiffness)
             faults.append(Fault(source, "key", name, allowed))
         try:
             frozen = distribution(bare)
@@ -268,7 +271,7 @@ def random_inputs(
     stiffness : whether keys may change K.
     """
     if not isinstance(scene, JointScene):
-        raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}))
+        raise InputError.one("--random", "key", ", ".join(laws), allowed_keys({}, stiffness))
     scanned = gaps is not None and gaps.points is not None
     inputs, faults = inputs_of(scene, laws, stiffness, scanned)
     d = len(inputs) + bool(gaps)

@@ -106,7 +106,7 @@ def scan_modes(
 def gaps_of(
     joint: AnyJoint, path: Path, options: TableOptions, faults: list[Fault], notes: list[str]
 ) -> Vector | None:
-    """The gaps (m,) mm of a scan at the contacts; None with faults, which are added as unusual values are."""
+    """The gaps (m,) mm of a scan at the contacts, None with faults; faults and notes go into the lists."""
     read = read_columns(path, MeasuredGap.columns, options)
     faults += read.faults
     table = {"kind": "measured_gap", "points": read.rows}

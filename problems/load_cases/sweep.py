@@ -24,12 +24,13 @@ from . import LoadCases
 
 SYNTAX = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
 MOST, MOST_CASES = 100_000, 10_000_000  # values of a key; combinations
-NOTHING, OTHER = "the scene has no force or gap to sweep", "what changes K would be another assembly"
+NOTHING = "the scene has no number that changes a force or a gap"
+OTHER = "what changes K would be another assembly"
 
 
 @dataclass(frozen=True)
 class Key:
-    """A number that changes f or g: its name, the index of its effect, and the keys that lead to it.
+    """A number of an effect: its name, the index of its effect, and the keys that lead to it.
 
     `points.x` and `points.y` are a shift of all points of an effect, mm; any other key is replaced.
     """
@@ -96,7 +97,7 @@ def in_order(changes: Iterable[Change]) -> list[Change]:
 def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
     """The load cases of --sweep options. Raises InputError with all faults."""
     if not isinstance(scene, JointScene):
-        raise InputError.one("--sweep", "key", ", ".join(texts), f"{NOTHING}; {OTHER}")
+        raise InputError.one("--sweep", "key", ", ".join(texts), allowed_keys({}))
     faults: list[Fault] = []
     found = [step for text in texts if (step := _step(scene, text, faults))]
     names, steps = [key.name for key, _ in found], dict(found)
@@ -151,9 +152,10 @@ def keys_of(scene: JointScene, stiffness: bool = False) -> dict[str, Key]:
     return keys
 
 
-def allowed_keys(keys: dict[str, Key]) -> str:
-    """The names of these keys, for messages."""
-    return (f"one of {', '.join(keys)}" if keys else NOTHING) + f"; {OTHER}"
+def allowed_keys(keys: dict[str, Key], stiffness: bool = False) -> str:
+    """The names of these keys, for messages. stiffness : whether keys may change K."""
+    named = f"one of {', '.join(keys)}" if keys else NOTHING
+    return named if stiffness else f"{named}; {OTHER}"
 
 
 def _numbers(table: dict[str, Any]) -> list[tuple[str, ...]]:

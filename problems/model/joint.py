@@ -25,7 +25,7 @@ from .plate import Plate
 from .surface import Grid
 
 MOST, MOST_NODES = 100_000, 10**7  # mesh lines, nodes; what fits in memory is another question
-Nodes = Annotated[int, Field(ge=2, le=MOST), PLAIN]
+NodeCount = Annotated[int, Field(ge=2, le=MOST), PLAIN]
 SHORT = 20.0  # mm, a junction that may have been given in metres
 SLENDER = 50.0  # an element's longer side to its shorter
 SOFT, STIFF = 1e3, 1e6  # N/mm², around the moduli of plastics and metals
@@ -46,7 +46,7 @@ class Junction(Table):
 
     length: Annotated[Positive, "mm"]
     width: Annotated[Positive, "mm"]
-    nodes: tuple[Nodes, Nodes]
+    nodes: tuple[NodeCount, NodeCount]
 
     @field_validator("nodes")
     @classmethod

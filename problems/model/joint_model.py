@@ -109,7 +109,7 @@ class JointModel:
 
     @cached_property
     def numbering(self) -> Numbering:
-        return Numbering.of(self.parts, self.springs.tied)
+        return Numbering.of(self.parts, self.springs.groups)
 
     @cached_property
     def junction(self) -> Indices:
@@ -122,11 +122,11 @@ class JointModel:
         blocks = []
         added = self._at_junction(self._at_junction(self.springs.added).T)
         ends = np.cumsum([0, *self.numbering.sizes])
-        for parts, start, stop in zip(self.springs.tied, ends[:-1], ends[1:], strict=True):
+        for parts, start, stop in zip(self.springs.groups, ends[:-1], ends[1:], strict=True):
             K = self._block(parts, int(start), int(stop - start))
             blocks.append(sp.csc_array(K + added[start:stop, start:stop] if self.springs else K))
         B, nodes = self._at_junction(self.joint.contact_matrix()), self._nodes()
-        names = self._names(self.springs.tied)
+        names = self._names(self.springs.groups)
         return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, names, junction=self.junction)
 
     def _names(self, blocks: Iterable[Iterable[int]]) -> tuple[str, ...]:

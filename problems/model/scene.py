@@ -89,7 +89,7 @@ class Scene(ABC):
 
     @property
     def output(self) -> Output:
-        """What an answer has besides displacements, gaps and forces; in no key."""
+        """The parts of an answer besides displacements, gaps and forces; in no key."""
         return GAPS_ALONE
 
     @property
@@ -128,7 +128,7 @@ class JointScene(Scene):
 
     @property
     def numbers(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
-        """`origin`, or that of a stage in which everything acts."""
+        """The number and the acting elements of each effect: `origin`, or if that is empty all elements."""
         counts = enumerate(effect.element_count(self.joint) for effect in self.effects)
         return self.origin or tuple((i, tuple(range(count))) for i, count in counts)
 
@@ -221,21 +221,24 @@ class ManufacturedScene(Scene):
     """Matrices constructed in memory: a rung of a ladder without plates, or a user's own.
 
     make : makes the same problem at every call. block_sizes : the number of unknowns of each block of K.
-    m : the number of contacts. sparse : whether K's blocks are sparse. by_user : whether K is a user's.
+    m : the number of contacts. sparse : whether K's blocks are sparse.
+    refuses_singular : whether K is refused if it is nearly singular.
     """
 
     make: Callable[[], ManufacturedProblem]
     block_sizes: tuple[int, ...]
     m: int
     sparse: bool = False
-    by_user: bool = False
+    refuses_singular: bool = False
 
     @classmethod
     def of(cls, title: str, problem: ManufacturedProblem, name: str = "", refused: str = "") -> Self:
-        """The scene of a user's problem, which is already made."""
+        """The scene of a problem that is already made: a user's own, or a small rung of a ladder."""
         K, m = problem.assembly.K, problem.assembly.m
         sizes = tuple(block.size for block in K.blocks)
-        return cls(name, title, lambda: problem, sizes, m, not K.dense, by_user=True, refused=refused)
+        return cls(
+            name, title, lambda: problem, sizes, m, not K.dense, refused=refused, refuses_singular=True
+        )
 
     @property
     def made(self) -> ManufacturedProblem:

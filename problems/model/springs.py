@@ -43,8 +43,8 @@ class Springs:
         return bool(len(self.k))
 
     @cached_property
-    def tied(self) -> list[list[int]]:
-        """The parts of each block of K: parts that springs join are one block."""
+    def groups(self) -> list[list[int]]:
+        """The groups of parts that springs join: each is one block of K."""
         count, T = len(self.parts), self.T
         linked = sp.lil_array((count, count))
         if self:
@@ -57,7 +57,7 @@ class Springs:
     def ranges(self) -> list[list[int]]:
         """The parts of each dense block: consecutive ones, from the first to the last that springs join."""
         ranges: list[list[int]] = []
-        for parts in sorted(self.tied):
+        for parts in sorted(self.groups):
             if ranges and parts[0] <= ranges[-1][-1]:
                 ranges[-1] = list(range(ranges[-1][0], max(ranges[-1][-1], parts[-1]) + 1))
             else:

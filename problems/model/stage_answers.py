@@ -9,7 +9,7 @@ springs. Without a preload they are free of force in s, whose answer is then the
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar, overload
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,8 +18,8 @@ from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 
 from .effect import SpringEffect
-from .scene import JointScene
-from .stages import Acting, Elements, Plan, acting_effects, of_effect
+from .scene import JointScene, Scene
+from .stages import Acting, Elements, StagePlan, acting_effects, of_effect
 
 Answer = TypeVar("Answer")
 #: Of an answer x (n, k), mm: Tᵀx (r, k) for directions T (n, r).
@@ -48,7 +48,7 @@ def through(
         see `locked`; and its answer. A stage is solved again with the fasteners that it sets if these have a
         preload, or if it is the last one.
     """
-    joint, locks = scene.joint, _given(scene, cases)
+    joint, locks = scene.joint, _given_approaches(scene, cases)
 
     def assembled(step: Acting, elements: Elements) -> tuple[JointScene, Matrix]:
         rows = [at[:, of_effect(number, elements)].reshape(-1, cases) for number, at in locks.items()]
@@ -60,7 +60,7 @@ def through(
         except InputError as error:
             raise error.in_stage(step.name) from error
 
-    *_, last = steps = Plan(scene.effects, scene.stages, joint).steps
+    *_, last = steps = StagePlan(scene.effects, scene.stages, joint).steps
     for step in steps:
         fresh = frozenset((number, k) for number, k in step.fresh if number in locks)
         part, approaches = assembled(step, step.elements - fresh)
@@ -91,14 +91,27 @@ def locked(scene: JointScene, approaches: Vector) -> JointScene:
 
 
 def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
-    """What acts at the end of each stage, by its name: scenes without stages and approaches.
+    """The scene at the end of each stage, by its name, without stages and locked approaches.
 
-    The scene under "" if it has no stages.
+    The scene itself under "" if it has no stages.
     """
     if not scene.stages:
         return {"": scene}
-    steps = Plan(scene.effects, scene.stages, scene.joint).steps
+    steps = StagePlan(scene.effects, scene.stages, scene.joint).steps
     return {step.name: _scene(scene, step, step.elements) for step in steps}
+
+
+@overload
+def last_scene(scene: JointScene) -> JointScene: ...
+
+
+@overload
+def last_scene(scene: Scene) -> Scene: ...
+
+
+def last_scene(scene: Scene) -> Scene:
+    """The scene at the end of the last stage, see `stage_scenes`; the scene itself if it has no stages."""
+    return [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
 
 
 def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
@@ -108,7 +121,7 @@ def _scene(scene: JointScene, step: Acting, elements: Elements) -> JointScene:
     return replace(scene, title=title, effects=tuple(acting.values()), stages=(), origin=origin)
 
 
-def _given(scene: JointScene, cases: int) -> dict[int, Matrix]:
+def _given_approaches(scene: JointScene, cases: int) -> dict[int, Matrix]:
     """The approaches that effects give, by the effect's number: (pairs, elements, springs, cases) mm."""
     approaches, joint = {}, scene.joint
     for number, effect in enumerate(scene.effects):

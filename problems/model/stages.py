@@ -38,7 +38,7 @@ class Stage(Table):
 
 @dataclass(frozen=True)
 class Acting:
-    """What acts in a stage of that name. fresh : what the stage sets."""
+    """The elements that act in a stage of that name. fresh : those that the stage sets."""
 
     name: str
     elements: Elements
@@ -57,8 +57,8 @@ def acting_effects(effects: Sequence[Effect], elements: Elements, joint: AnyJoin
 
 
 @dataclass
-class Plan:
-    """What acts in each stage, as far as the names in the stages are right; `wrong` says which are not.
+class StagePlan:
+    """The acting elements of each stage; `wrong` lists the entries of the stages that are wrong.
 
     effects, stages : those of a scene. joint : its joint. steps : one without a name if there are no stages.
     """

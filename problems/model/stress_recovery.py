@@ -22,7 +22,10 @@ SIDES = {"top": 1, "bottom": -1}
 
 @dataclass(frozen=True)
 class StressRecovery:
-    """places (k, 2) x and y, mm; side (k,) 1 or -1; S (3k, n), N/mm² per mm or rad."""
+    """A recovery matrix and its points.
+
+    places (k, 2) : x and y, mm. side (k,) : 1 or -1. S (3k, n) : N/mm² per mm or rad.
+    """
 
     places: Matrix
     side: Indices

@@ -20,10 +20,11 @@ from pydantic import Field, field_validator, model_validator
 
 from problems import storage
 from problems.errors import InputError
-from problems.formats import DENSEST, read_stiffness
+from problems.formats import read_stiffness
 from problems.forms.assembly import Indices, Matrix
 from problems.input import matrix_files
 from problems.input.bounded_types import PLAIN, Name, regular_file
+from problems.input.matrix_entries import DENSEST
 from problems.input.user_matrices import SMALL, UNCHANGED, checked
 from problems.storage import fingerprint
 
@@ -31,7 +32,7 @@ from .joint import Table
 from .node_table import Nodes, listed, read_nodes
 from .superelement_rows import NORMAL_ALONE, Order, rows_of
 
-MIB = 16_384
+LARGEST_MIB = 16_384
 LOST = 0.05  # the largest share of a normal along degrees of freedom that K does not keep
 FREE = 1e-9  # of max |K||r|: a smaller Kr is no force; held parts have 1e-4 and more, free ones 1e-12
 SHARE = 0.3  # of a motion's largest component: smaller components do not name it
@@ -261,7 +262,7 @@ class Superelement:
 def _hash(path: Path) -> str:
     """The hash of a file's bytes, as two files of one size and time may differ. Raises InputError."""
     try:
-        with regular_file(path, "superelement", MIB).open("rb") as file:
+        with regular_file(path, "superelement", LARGEST_MIB).open("rb") as file:
             return storage.digest(path.suffixes[-2:], hashlib.file_digest(file, "sha256").hexdigest())
     except OSError as error:
         raise InputError.one(path, "superelement", error.strerror, "a readable file") from error

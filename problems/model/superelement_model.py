@@ -19,10 +19,10 @@ import scipy.sparse as sp
 
 from problems import storage
 from problems.errors import Fault, InputError
-from problems.formats import DENSEST
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.dependence import is_dependent, refuse_dependent
 from problems.forms.preparation_stages import DensePrepared, SparsePrepared
+from problems.input.matrix_entries import DENSEST
 from problems.input.user_matrices import SMALL
 from problems.reporter import SILENT, Reporter
 from problems.stiffness import Vector, balanced_units
@@ -95,7 +95,8 @@ class SuperelementModel:
             blocks.append(sp.csc_array(K + added[rows, rows] if self.springs else K))
         seconds = time.perf_counter() - start
         key = storage.digest("sparse", self._key, fingerprint([Path(__file__)], ("problems/model",)))
-        return SparsePrepared(self._assembly(blocks), key, seconds, self.scene.source_of, user_K=True)
+        source_of = self.scene.source_of
+        return SparsePrepared(self._assembly(blocks), key, seconds, source_of, refuses_singular=True)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K with dense blocks. Raises InputError if contacts depend on one another."""

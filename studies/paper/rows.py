@@ -76,7 +76,7 @@ class Study:
 
     @property
     def sizes(self) -> list[int]:
-        """Those with at least two scenes of METHODS."""
+        """The sizes with at least two scenes of METHODS."""
         scenes = {(r["n"], r["scene"]) for r in self.rows if r["method"] in METHODS}
         return sorted({int(n) for n, _ in scenes if sum(n == other for other, _ in scenes) > 1})
 
@@ -156,7 +156,7 @@ class Counts:
 
 
 def counts(row: Mapping[str, Any] | None) -> Counts | None:
-    """None if the run ended before it could report them."""
+    """The CG iterations of a run; None if it ended before it could report them."""
     cg = row["details"].get("cg") if row else None
     if row is None or not cg or not cg["predictor"]:
         return None
@@ -195,7 +195,7 @@ def pairs(a: ByScene, b: ByScene) -> list[tuple[Row, Row]]:
 
 
 def clearly_faster(a: Row, b: Row) -> bool | None:
-    """None if they take about as long, or a lower bound leaves it open."""
+    """Whether a is faster than b; None if they take about as long, or a lower bound leaves it open."""
     if TIE * a["at_least"] < b["at_least"]:
         return None if a["cut"] else True
     if TIE * b["at_least"] < a["at_least"]:

@@ -51,7 +51,7 @@ def u_needs_more_cg_than_v(study: Study) -> Evidence:
 
 
 def faster_than(rival: str, mine: Iterable[str] = ORDERINGS) -> Callable[[Study], Evidence]:
-    """V, in each ordering, than another of SYSTEMS."""
+    """Evidence that V, in each ordering of `mine`, is faster than another of SYSTEMS."""
 
     def evidence(study: Study) -> Evidence:
         for name in mine:
@@ -65,7 +65,7 @@ def faster_than(rival: str, mine: Iterable[str] = ORDERINGS) -> Callable[[Study]
 
 
 def _starts(study: Study, start: str = "algorithm_5") -> ByScene:
-    """What the details of each row say of its start, and m."""
+    """The details of each row on its start, with m."""
     rows = study.ipm(start=start).items()
     return {scene: about | {"m": r["m"]} for scene, r in rows if (about := r["details"].get("start"))}
 

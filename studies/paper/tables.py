@@ -14,7 +14,7 @@ from report.figures import style
 from .printed import TABLE_1, TABLE_2, TABLE_4
 from .rows import SCALING, SYSTEMS, Counts, Row, Study, counts, table
 
-N = 4386  # of the printed table
+N = 4386  # of the printed tables 1 and 2
 PRINTED = {name: Counts(both["predictor"], both["corrector"]) for name, both in TABLE_1.items()}
 #: Colour, marker and dashes of each line; the printed ones grey and black.
 LOOKS = {
@@ -77,7 +77,6 @@ def _drawn(lines: dict[str, Counts]) -> Drawing:
 
 STARTS = {"stp1": "STP1", "stp2": "STP2", "algorithm_5": "Algorithm 5", "mehrotra": "Mehrotra"}
 RIVALS = ("stp1", "stp2")
-N = 4386
 
 
 def loads(study: Study) -> dict[int, dict[str, Row]]:
@@ -91,7 +90,7 @@ def loads(study: Study) -> dict[int, dict[str, Row]]:
 
 
 def iterations(row: Row | None) -> int | None:
-    """None without an answer."""
+    """The iterations of a row; None without an answer."""
     return int(row["iterations"]) if row and row["verdict"] != "no_answer" else None
 
 

@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable, Iterable
 
 import numpy as np
+import pandas as pd
 
+from report.analysis.standings import geometric_mean
 from report.analysis.time_to_solution import Exponent
 from report.document.numbers import power, significant, whole
 
@@ -29,7 +31,7 @@ def _fits(study: Study, quantity: str, methods: Iterable[str]) -> dict[str, Expo
 
 
 def exponent_at_most(quantity: str, order: float, methods: Iterable[str]) -> Callable[[Study], Evidence]:
-    """The fitted exponent, less two standard errors."""
+    """Evidence that the fitted exponent, less two standard errors, is at most `order`."""
 
     def evidence(study: Study) -> Evidence:
         for name, fit in _fits(study, quantity, methods).items():
@@ -76,7 +78,7 @@ def ipm_needs_less_memory(study: Study) -> Evidence:
 
 
 def _timed(study: Study, method: str, n: int) -> list[Row]:
-    """By active contacts."""
+    """The rows of a method at a size with a time, by active contacts."""
     rows = [row for row in study.of(method, n).values() if row["at_least"]]
     return sorted(rows, key=lambda row: row["active"])
 
@@ -161,16 +163,12 @@ def worst_case_below(study: Study) -> Evidence:
 
 
 def _mean_below(study: Study, rival: str, n: int) -> tuple[bool | None, str]:
-    """Of the geometric means over the scenes of both."""
+    """Whether the interior-point method's geometric mean, over the scenes of both, is below a rival's."""
     both = pairs(study.of("IPM", n), study.of(rival, n))
     if not both:
         return None, "not measured"
-    mine, other = (merged(rows, _geometric_mean) for rows in zip(*both, strict=True))
+    mine, other = (merged(rows, lambda s: geometric_mean(pd.Series(s))) for rows in zip(*both, strict=True))
     return clearly_faster(mine, other), against(mine, other)
-
-
-def _geometric_mean(values: list[float]) -> float:
-    return float(np.exp(np.log(values).mean()))
 
 
 def gi_is_faster_if_well_chosen(study: Study) -> Evidence:

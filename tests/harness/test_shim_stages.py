@@ -16,7 +16,6 @@ from small_joints import FASTENERS, GAP, STAGED, two_parts, with_gap
 from harness import solve, stresses
 from harness.placement.session import PlanSession, Question
 from harness.series.load_case_source import GapCases
-from harness.series.staged import last_scene
 from harness.shimming.patches import patches_of
 from harness.shimming.search import ShimSearch
 from harness.shimming.study import ShimStudy
@@ -25,6 +24,7 @@ from problems.effects.shims import Shims
 from problems.load_cases import Listed
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
+from problems.model.stage_answers import last_scene
 from problems.scene_files import read_scene
 
 
@@ -35,7 +35,6 @@ def session_of(
     read = read_scene(str(path))
     assert isinstance(read, JointScene)
     bare = last_scene(read)
-    assert isinstance(bare, JointScene)
     cases = Listed((load_case(bare),))
     return PlanSession(ShimStudy(bare, cases, "dual", patches_of(read.joint, patches), limits, read, ends))
 

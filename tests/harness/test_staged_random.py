@@ -19,12 +19,13 @@ from harness.scene.solution import solve
 from harness.series.executors import solve_on_worker
 from harness.series.load_case_source import GapCases
 from harness.series.session import Job, Result, SeriesOptions
-from harness.series.staged import StagedSession, last_scene
+from harness.series.staged import StagedSession
 from harness.shimming.patches import patches_of
 from harness.shimming.study import ShimStudy
 from problems.forms import Form
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
+from problems.model.stage_answers import last_scene
 from problems.scene_files import read_scene
 from rivetbench import run_series
 
@@ -177,7 +178,7 @@ def test_searches_draw_what_a_series_draws(tmp_path: Path) -> None:
     movable, patches = MovableFasteners.of(scene), patches_of(scene.joint, "1x1")
     job = job_of(scene, {name: law for name, law in LAWS.items() if not name.startswith("fasteners")})
     rows = [row for row, _ in results_of(job).values()]
-    shims = ShimStudy(last_scene(scene), job.cases, "dual", patches, (1e9, np.inf), scene)  # type: ignore[arg-type]
+    shims = ShimStudy(last_scene(scene), job.cases, "dual", patches, (1e9, np.inf), scene)
     tacks = FastenerStudy(movable.bare, job.cases, "dual", movable)
     for study, plan in ((tacks, movable.current), (shims, ())):
         (outcome,) = PlanSession(study).answer(Question((plan,), (0, 1)))  # type: ignore[arg-type]

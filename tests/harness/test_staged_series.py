@@ -12,9 +12,10 @@ from harness.results import series_file
 from harness.scene.solution import solve
 from harness.series.load_case_source import GapCases
 from harness.series.session import Job
-from harness.series.staged import StagedSession, last_scene
+from harness.series.staged import StagedSession
 from problems.forms import Form
 from problems.model.scene import JointScene
+from problems.model.stage_answers import last_scene
 from problems.scene_files import read_scene
 
 COUNT = 3

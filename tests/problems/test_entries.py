@@ -182,7 +182,8 @@ def test_signs_in_paths_are_no_names() -> None:
 def test_labelled_rows_are_said_and_digits_of_dmig_kept() -> None:
     data = {"A": sp.csc_array(np.eye(2, 1)), "f": np.array([1.0, -1.23456789e-101]), "g": np.ones(1)}
     formats.FORMATS["dmig"].write(Path("rest.pch"), data | {"K": sp.csr_array(K)})
-    np.testing.assert_array_equal(formats.read(Path("rest.pch"))["f"], data["f"])
+    f, _ = formats.read_labelled(Path("rest.pch"))["f"]
+    np.testing.assert_array_equal(formats.vector(f), data["f"])
     formats.FORMATS["mtx"].write(Path("."), data)
     Path("K.mtx").write_text("9,1,9,1,4.0\n4,2,4,2,3.0\n")
     shown = StringIO()

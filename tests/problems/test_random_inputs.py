@@ -188,6 +188,16 @@ def test_a_bad_input_is_told_what_is_allowed(scene: Scene, text: str, allowed: s
         drawn(scene, text)
 
 
+def test_keys_that_change_the_stiffness_are_refused_only_where_they_are_not_allowed(scene: Scene) -> None:
+    said = []
+    for stiffness in (False, True):
+        with pytest.raises(InputError, match=r"fasteners\.preload") as error:
+            GapCases(random=("ribs.K=normal(2e3, 1)",)).of(scene, "dual", stiffness=stiffness)
+        said.append(str(error.value))
+    assert ["another assembly" in text for text in said] == [True, False]
+    assert ["ribs.I" in text for text in said] == [False, True]
+
+
 def test_all_faults_are_told_at_once(scene: Scene) -> None:
     with pytest.raises(InputError) as error:
         drawn(scene, PRELOAD, PRELOAD, "a=b", "fasteners.points.x=normal(0, -1)", count=None, contributors=3)

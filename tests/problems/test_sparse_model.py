@@ -112,7 +112,7 @@ def test_the_numbering_is_one_and_narrow(name: str) -> None:
         assert (
             np.flatnonzero(place < 0) == np.sort(np.concatenate([*clamped, np.zeros(0, dtype=int)]))
         ).all()
-    for parts, K in zip(model.springs.tied, model.assembly().K.matrices, strict=True):
+    for parts, K in zip(model.springs.groups, model.assembly().K.matrices, strict=True):
         along = sum(len(model.parts[part].plate.x) for part in parts)
         across = sum(len(model.parts[part].free_lines) for part in parts)
         assert half_bandwidth(K) <= 4 * (min(along, across) + 2) - 1

@@ -12,7 +12,7 @@ from small_joints import untied
 from superelements import stiffnesses, write_part
 
 from harness.scene.solution import solve
-from problems.build import load_case, prepared, shares_stiffness
+from problems.build import adopts_model, load_case, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.forms import Form
@@ -210,7 +210,7 @@ def test_many_cases_go_through_at_once() -> None:
 
 def test_stages_share_the_stiffness_that_they_have_in_common() -> None:
     scenes = [*stage_scenes(joined([CLAMP, {"name": "drill"}, *ONCE[1:]])).values()]
-    assert [shares_stiffness(scene, scenes[0]) for scene in scenes] == [True, True, False, False]
+    assert [adopts_model(scene, scenes[0]) for scene in scenes] == [True, True, False, False]
     assert scenes[1].model is not None
     with pytest.raises(InputError, match="no stages here"):
         prepared(joined(ONCE))
