@@ -222,7 +222,7 @@ def scene_to_measure(measurements: Sequence[Measurement]) -> Scene:
     if first.series is None and scene.stages:
         from harness.verification.reference_problem import last_stage
 
-        return last_stage(scene, first.suite.reference_limit_s)
+        return last_stage(scene, first.suite.reference_limit_s)[0]
     return scene
 
 

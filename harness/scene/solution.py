@@ -4,10 +4,12 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from harness.planning.form_choice import Choice, chosen_form
 from harness.solving.session import answer_of, form_of
@@ -94,7 +96,9 @@ class Solution:
 
     @property
     def gap_error_mm(self) -> Vector:
-        """(m,) how far each gap is from the exact one at most, mm."""
+        """(m,) how far each gap is from the exact one at most, mm; of a scene with stages in the last one."""
+        if self.stages:
+            return self.stages[-1].gap_error_mm
         problem, bound = self.problem, self.error_bound_mm
         return GapError.of(problem.prepared.assembly)(problem.load.g, self.unknowns, bound)
 
@@ -205,14 +209,23 @@ def solve(
     if not (isinstance(scene, JointScene) and scene.stages):
         return answered(scene)
 
-    def of_stage(part: JointScene, approaches: Matrix) -> tuple[Elongations, Solution]:
+    locks_mm = 0.0  # the largest bound on an answer in which fasteners lock
+
+    def of_stage(part: JointScene, approaches: Matrix) -> tuple[Elongations, tuple[Solution, float]]:
         clock.where = f"{part.title}: "
-        answer = answered(locked(part, approaches[:, 0]))
-        x = answer.problem.prepared.assembly.at_junction(answer.problem.reference.x)
-        return lambda T: T.T @ x, answer
+        answer, before_mm = answered(locked(part, approaches[:, 0])), locks_mm
+        reference, at_junction = answer.problem.reference, answer.problem.prepared.assembly.at_junction
+
+        def elongations(T: sp.csc_array) -> Matrix:
+            nonlocal locks_mm
+            locks_mm = max(locks_mm, reference.bound_mm)
+            return T.T @ at_junction(reference.x)
+
+        return elongations, (answer, before_mm)
 
     history = []
-    for name, part, approaches, answer in through(scene, of_stage):
+    for name, part, approaches, (answer, before_mm) in through(scene, of_stage):
+        unproven = 0.0 if before_mm <= LIMIT_MM else inf
         history.append(
             StageAnswer(
                 name=name,
@@ -222,7 +235,7 @@ def solve(
                 gap=answer.gap,
                 judgement=answer.judgement,
                 error_bound_mm=answer.error_bound_mm,
-                gap_error_mm=answer.gap_error_mm,
+                gap_error_mm=answer.gap_error_mm + unproven,
             )
         )
     return replace(answer, scene=scene, stages=tuple(history))

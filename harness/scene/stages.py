@@ -32,7 +32,8 @@ class StageAnswer:
     error_bound_mm : float
         Proven bound on max|x − x*|, mm, for the exact answer x* at the approaches that are locked.
     gap_error_mm : array (m,), mm
-        How far each gap is at most from that of x*.
+        How far each gap is at most from that of x*; infinite if fasteners have locked in a stage whose answer
+        is not proven to within 1e-7 mm.
     """
 
     name: str

@@ -152,7 +152,7 @@ class StagedSession:
     @staticmethod
     def _result(stages: list[tuple[str, Result]]) -> Result:
         """The result of the last stage, with the largest gap of each, and the verdict of the first that is
-        not within.
+        not within: after it, the error of a gap is not known.
         """
         row, gap = stages[-1][1]
         gaps = {name: result.row.get("max_gap_mm") for name, result in stages}
@@ -163,6 +163,8 @@ class StagedSession:
         said = f"stage {name}: {other['message'] or other['verdict']}"
         if other["verdict"] == "no_answer":  # later stages have locked nothing that counts
             row, gap = other, None
+        elif name != stages[-1][0]:
+            row = row | {"gap_error_mm": np.inf, "bound_mm": np.inf}
         return Result(row | {"verdict": other["verdict"], "message": said, "stages_max_gap_mm": gaps}, gap)
 
 

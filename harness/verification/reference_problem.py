@@ -4,10 +4,12 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from harness.planning.form_choice import form_of_stages
 from harness.results import records
@@ -23,8 +25,8 @@ from problems.model.stage_answers import Elongations, last_scene, locked, throug
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 
-from .judge import Judgement, Reference, conditioned_limit, judge
-from .reference import Candidate, default_limit_s, reference, reference_of
+from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement, Reference, conditioned_limit, judge
+from .reference import UNPROVEN, Candidate, default_limit_s, reference, reference_of
 
 PROBLEMS = "problems.jsonl"
 
@@ -35,6 +37,8 @@ class ReferenceProblem:
 
     limit_s : after it no further candidate for the reference is tried. case : the number of the load case in
     a series; None for the scene's own. first : candidates that are tried before the in-house methods.
+    locks_proven : whether the answers of earlier stages, in which fasteners lock, are proven; if not, this one
+    is not, either.
     """
 
     scene: Scene
@@ -44,6 +48,7 @@ class ReferenceProblem:
     limit_s: float | None = None
     case: int | None = None
     first: list[Candidate] = field(default_factory=list)
+    locks_proven: bool = True
 
     @cached_property
     def reference(self) -> Reference:
@@ -61,6 +66,8 @@ class ReferenceProblem:
             proven = reference_of(self.scene, self.prepared, self.load, self.limit_s, self.first)
         else:
             proven = reference(self.prepared, self.load, self.limit_s, self.first)
+        if not self.locks_proven:
+            proven = replace(proven, bound_mm=inf, route=f"{UNPROVEN}: what earlier stages lock")
         return proven, time.perf_counter() - start
 
     def add_candidate(self, name: str, path: Path) -> None:
@@ -107,7 +114,9 @@ def opened(
     scene: Scene, form: Form = "dual", reporter: Reporter = SILENT, limit_s: float | None = None
 ) -> ReferenceProblem:
     """Open or build a scene, of one with stages the last; see `open_stage`. Raises InputError."""
-    return replace(open_stage(last_stage(scene, limit_s), form, reporter, limit_s), scene=scene)
+    last, locks_proven = last_stage(scene, limit_s)
+    opened = open_stage(last, form, reporter, limit_s)
+    return replace(opened, scene=scene, locks_proven=locks_proven)
 
 
 def open_stage(
@@ -128,30 +137,37 @@ def open_stage(
     return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
 
 
-def last_stage(scene: Scene, limit_s: float | None = None) -> Scene:
-    """The last stage of a scene as a scene of its own; the scene itself if it has no stages.
+def last_stage(scene: Scene, limit_s: float | None = None) -> tuple[Scene, bool]:
+    """The last stage of a scene as a scene of its own, and whether the approaches that it has are proven; the
+    scene itself if it has no stages.
 
-    Its approaches are those of the proven references of the stages before, solved in the sparse form unless
-    matrices are dense. They are in the cache, so that all processes have the same. Raises InputError.
+    The approaches are those of the references of the stages before, solved in the sparse form unless matrices
+    are dense. Proven ones are in the cache, so that all processes have the same. Raises InputError.
     limit_s : see ReferenceProblem.
     """
     if not (isinstance(scene, JointScene) and scene.stages):
-        return scene
-    form, like = form_of_stages(scene), None
+        return scene, True
+    code = storage.fingerprint([Path(__file__)], within=["harness/verification", "problems"])
+    key, last = storage.digest("stages", scene.key, code), last_scene(scene)
+    if (stored := storage.load(key)) is not None:
+        return locked(last, stored[0]["approaches"][:, 0]), True
+    form, like, bounds = form_of_stages(scene), None, [0.0]
 
     def solve(part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
         nonlocal like
         like = open_stage(locked(part, approaches[:, 0]), form, limit_s=limit_s, like=like)
-        x = like.prepared.assembly.at_junction(like.reference.x)
-        return lambda T: T.T @ x, None
+        answer, at_junction = like.reference, like.prepared.assembly.at_junction
 
-    def made() -> storage.Entry:
-        *_, (_, _, approaches, _) = through(scene, solve)
-        return {"approaches": approaches}, {}
+        def elongations(T: sp.csc_array) -> Matrix:
+            bounds.append(answer.bound_mm)
+            return T.T @ at_junction(answer.x)
 
-    code = storage.fingerprint([Path(__file__)], within=["harness/verification", "problems"])
-    arrays, _ = storage.load_or_make(storage.digest("stages", scene.key, code), made)
-    return locked(last_scene(scene), arrays["approaches"][:, 0])
+        return elongations, None
+
+    *_, (_, _, approaches, _) = through(scene, solve)
+    if proven := max(bounds) <= REFERENCE_SHARE * LIMIT_MM:
+        storage.load_or_make(key, lambda: ({"approaches": approaches}, {}))  # unless another was faster
+    return locked(last, approaches[:, 0]), proven
 
 
 def measurable(

@@ -3,7 +3,7 @@ sparse factors in memory. Each is made when first needed.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -25,12 +25,21 @@ LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 SourceOf = Callable[[str], object]
 
 
+def _contents(assembly: Assembly) -> Iterator[list[int] | bytes]:
+    """What a key needs to tell A from another one: its shape and its arrays."""
+    A = assembly.A
+    yield [*A.shape]
+    for array in (A.data, A.indices, A.indptr):
+        yield array.tobytes()
+
+
 class SparsePrepared(Prepared):
     """A sparse K whose factors are made in memory; that raises InputError if K is not positive definite.
 
     Parameters
     ----------
-    key : names K in the cache, where bounds proven for it are kept. model_s : seconds in which K was made.
+    key : names K in the cache; with A, it names the bounds and answers that are proven and kept there.
+    model_s : seconds in which K was made.
     source_of : gives the origin of "K" or "A", for messages.
     refuses_singular : whether K is refused if it is nearly singular.
     """
@@ -47,7 +56,8 @@ class SparsePrepared(Prepared):
         K = Stiffness(assembly.K.blocks, self._factor)
         notes = (*assembly.notes, ONE_OF_MANY) if assembly.dependent else assembly.notes
         super().__init__(replace(assembly, K=K, notes=notes), coarser=coarser)
-        self.key, self.model_s, self.source_of = key, model_s, source_of
+        self.key = storage.digest(key, *_contents(assembly))
+        self.model_s, self.source_of = model_s, source_of
         self.refuses_singular = refuses_singular
 
     def _factor(self, K: Stiffness) -> None:
@@ -83,11 +93,10 @@ class DensePrepared(Prepared):
         reporter: Reporter,
     ) -> None:
         super().__init__(replace(assembly, K=Stiffness(assembly.K.blocks, self._open_factors)))
-        self.blocks, A = [b for b in assembly.K.blocks if isinstance(b, dense_block.DenseBlock)], assembly.A
+        self.blocks = [b for b in assembly.K.blocks if isinstance(b, dense_block.DenseBlock)]
         code = fingerprint([Path(__file__), Path(dense_block.__file__), Path(operator.__file__)])
         self.factors_key = storage.digest("factors", key, code)
-        parts = (A.data, A.indices, A.indptr)
-        self.key = storage.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
+        self.key = storage.digest("Q", self.factors_key, *_contents(assembly))
         self.model_seconds, self.source_of, self.reporter = model_seconds, source_of, reporter
 
     @property

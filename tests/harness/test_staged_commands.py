@@ -6,6 +6,7 @@ import shutil
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,9 @@ from harness.scene.mesh_error import on_mesh
 from harness.scene.solution import solve
 from harness.scene.solve import solve_into
 from harness.terminal import FAILED, GAP_EXCEEDED
+from harness.verification import reference_problem
+from harness.verification.judge import Reference
+from harness.verification.reference import reference_of
 from harness.verification.reference_problem import last_stage, opened
 from problems.forms import Form
 from problems.model.joint import Joint
@@ -72,6 +76,28 @@ def test_the_problem_is_the_last_stage(staged: Path, form: Form) -> None:
     assert abs(x - answer.x).max() <= 1e-10
     assert judge(scene, answer.unknowns, form=form).verdict == "within"
     assert last_stage(scene) == last_stage(read_scene(str(staged)))
+
+
+def test_an_answer_to_unproven_approaches_is_not_proven(
+    staged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No verdict rests on them, and they are not kept for one who asks for no limit."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+
+    def known_to_a_micrometre(*arguments: Any) -> Reference:
+        return replace(reference_of(*arguments), bound_mm=1e-3)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(reference_problem, "reference_of", known_to_a_micrometre)
+        problem = opened(read_scene(str(staged)))
+        assert problem.reference.bound_mm == np.inf
+        x, lam = problem.reference.x, problem.reference.lam
+        assert problem.judged(x, lam, 1e-7).verdict == "cannot_be_judged"
+        known = [np.isfinite(stage.gap_error_mm).all() for stage in solve(str(staged)).stages]
+        assert known == [True, True, False]
+    proven = opened(read_scene(str(staged))).reference
+    assert proven.bound_mm <= 1e-9
+    assert solve(str(staged)).gap_error_mm.max() <= 1e-7
 
 
 def test_what_is_measured_is_the_last_stage(staged: Path, tmp_path: Path) -> None:

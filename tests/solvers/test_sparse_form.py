@@ -56,7 +56,7 @@ def check(answer: Answer, dense: Prepared, load: LoadCase) -> None:
 @pytest.mark.parametrize("name", GALLERY)
 def test_a_scene_of_the_gallery(name: str) -> None:
     """Against the certified reference of the condensed matrices, whose code is another throughout."""
-    scene = last_stage(read_scene(name))
+    scene, _ = last_stage(read_scene(name))
     exact = reference(prepared(scene), load_case(scene))
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     for solver in ("newton", "mprgp"):
