@@ -167,7 +167,7 @@ def inspect(answer: Answer, trial: KnownProblem, case: KnownCase, form: Form) ->
         words = f'status is "{plain.status}" beside a right answer'
         return finding(words, "Say solved when the tolerance is met")
     if (smallest := float(plain.lam.min())) < -10 * TOLERANCE:
-        return finding(f"λ is as low as {smallest:.3g} N", "Contacts only push: λ ≥ 0 in both forms")
+        return finding(f"λ is as low as {smallest:.3g} N", "Contacts only push: λ ≥ 0 in every form")
     return None
 
 

@@ -43,7 +43,7 @@ PAGE = "page"  # where a wrong value was given
 
 @dataclass(frozen=True)
 class Settings:
-    """What may change of a scene while it is explored.
+    """The values of a scene that may change while it is explored.
 
     Parameters
     ----------

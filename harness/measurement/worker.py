@@ -112,7 +112,7 @@ class Run(Reporter):
         self.events.report(**{name: more_s + time.perf_counter() - start})
 
     def outcomes(self) -> Iterator[Outcome]:
-        """Solve the load cases: the last event of each."""
+        """Solve the load cases; yields the last event of each row."""
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
         solver = make_solver(m.solver, m.entry.options, plugin)
@@ -144,7 +144,7 @@ class Run(Reporter):
                 yield outcome
 
     def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Outcome:
-        """Solve one load case and save its answer: the last event."""
+        """Solve one load case and save its answer; returns the last event of its row."""
         problem = session.problem
         start = time.perf_counter()
         (load,) = problem.loads([case])
@@ -199,7 +199,7 @@ class Run(Reporter):
     def saved(
         self, answer: Answer, x: Vector | None, file: Path, problem: Problem, fields: Report
     ) -> Outcome:
-        """Report the figures of an answer, and save it: the last event."""
+        """Report the figures of an answer, and save it; returns the last event of its row."""
         stages = " ".join(problem.prepared.opened)
         peak = resident_mib("VmHWM")
         self.events.report(phase="save")

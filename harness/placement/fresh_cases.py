@@ -35,8 +35,10 @@ MOST = 10**7  # fresh cases
 
 @dataclass(frozen=True)
 class Goal:
-    """What is searched for: the fewest fasteners with which at least `share` of the cases keep limit_mm, or
-    the best plan of `count` fasteners. also : other limits, in words.
+    """The aim of a search.
+
+    The fewest fasteners with which at least `share` of the cases keep limit_mm, or the best plan of `count`
+    fasteners. also : other limits, in words.
     """
 
     limit_mm: float | None

@@ -139,7 +139,7 @@ def place(
     refuse_inputs([*(directory / name for name in OUTPUTS), *report_files], inputs)
     movable, source = MovableFasteners.of(read), file_of(scene, read)
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
-    single = cases.are_one(movable.bare)
+    single = cases.is_single(movable.bare)
     faults = cases.faults(table=candidates is not None and Path(candidates).is_file())
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))

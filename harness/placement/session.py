@@ -49,7 +49,7 @@ POWER = 8  # of the mean of gaps that stands for the largest one where that does
 
 @dataclass(frozen=True)
 class Study(ABC):
-    """What acts in the last stage of a scene but the items of a plan, and its load cases."""
+    """The last stage of a scene without the items of a plan, and its load cases."""
 
     bare: JointScene
     cases: LoadCases
@@ -63,7 +63,7 @@ class Study(ABC):
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What decides the outcome of a plan."""
+        """The facts that decide the outcome of a plan."""
         return {
             "scene_key": self.scene.key,
             "cases_key": self.cases.content_key,
@@ -73,12 +73,12 @@ class Study(ABC):
         }
 
     def bare_stage(self, part: JointScene, plan: Plan) -> tuple[JointScene, Plan]:
-        """What acts in a stage but the items, and the items that do."""
+        """The scene of a stage without items, and the items that act in it."""
         return part, plan
 
     @abstractmethod
     def effect(self, item: Place) -> Effect:
-        """What an item adds to the scene."""
+        """The effect of an item."""
 
     def further(self, answer: "CaseAnswer") -> tuple[float, ...]:
         """More figures of a case."""
@@ -133,7 +133,7 @@ class Outcome:
 
 
 class StiffnessSession:
-    """What stages with the same K share; its matrices are made once. scene : one of these stages."""
+    """The matrices and proof that stages with the same K share. scene : one of these stages."""
 
     def __init__(self, study: Study, scene: JointScene) -> None:
         self.study, self.scene = study, scene
@@ -145,7 +145,7 @@ class StiffnessSession:
 
     @cached_property
     def sensitivities(self) -> list[Vector]:
-        """Of the stresses of superelements; see `harness.scene.stress.sensitivities`."""
+        """The sensitivities of superelement stresses; see `harness.scene.stress.sensitivities`."""
         return sensitivities(self.study.bare, self.proof)
 
     def column(self, item: Place) -> tuple[Vector, Vector, Vector]:
@@ -221,7 +221,7 @@ class CaseAnswer:
 
     @property
     def scene(self) -> JointScene:
-        """What acts in this case but the items, without stages."""
+        """The scene of this case without items and stages."""
         study = self.session.study
         part = locked(study.bare, self.approaches)
         return study.cases.scene_of(self.number, part) or part

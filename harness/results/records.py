@@ -24,7 +24,7 @@ from .schema import SERIES
 Row = dict[str, Any]
 
 MEASUREMENTS, PLANS, SHIMS, TOLERANCE = "measurements.jsonl", "plans.jsonl", "shims.jsonl", "tolerance.json"
-#: The files with which the commands go on; a directory has one of them.
+#: The file by which each command continues an interrupted run; a directory has one of them at most.
 JOURNALS = (MEASUREMENTS, SERIES, PLANS, SHIMS, TOLERANCE)
 OUTDATED = "measurements.outdated.jsonl"
 ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read

@@ -43,8 +43,8 @@ from report.document.numbers import counted
 from .solution import Source, load_scene
 
 Arrays = dict[str, Any]
-#: The columns of a test set, https://github.com/qpsolvers/qpbenchmark; matrices are dense, row by row.
 AT_ONCE = 2**20  # lines of a text
+#: The columns of a test set, https://github.com/qpsolvers/qpbenchmark; matrices are dense, row by row.
 TEST_SET = ("P", "q", "G", "h", "A", "b", "lb", "ub", "name")
 
 

@@ -54,8 +54,8 @@ def estimated(
 
     None for given matrices and superelements, whose mesh is not known; without contacts or a coarser mesh;
     and where another mesh has no answer. refine : solve on a finer mesh too, with four times the unknowns. r
-    is the smaller one of the two sides of the junction, but above 1. largest_stress : of an answer û to a
-    scene without stages.
+    is the smaller of the ratios of the distances between lines, along x and along y, that are above 1.
+    largest_stress : of an answer û to a scene without stages.
     """
     scene = solution.problem.scene
     joint = scene.joint if isinstance(scene, JointScene) else None

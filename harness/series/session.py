@@ -49,7 +49,7 @@ class SeriesOptions:
     Parameters
     ----------
     solver : str
-        Name of a solver, or of the plug-in's.
+        Name of a solver, or of the one in the plug-in.
     form : str, optional
         "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
     tolerance : float

@@ -29,7 +29,7 @@ S = TypeVar("S")
 
 
 def last_scene(scene: Scene) -> Scene:
-    """What acts in the last stage of a scene, or the scene if it has no stages."""
+    """The last stage of a scene, without approaches; the scene itself if it has no stages."""
     return [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
 
 
@@ -80,8 +80,10 @@ class StageCases(LoadCases):
 
 @dataclass(frozen=True, eq=False)
 class OpenStage(Generic[S]):
-    """What the load cases of a stage share: its scene without approaches, the session of its K, f (n,) N, the
-    change of the gap from the last stage (m,) mm, and its springs.
+    """A stage as its load cases share it.
+
+    scene : without approaches. session : of its K. f : (n,) N. gap_change : from the last stage, (m,) mm.
+    springs : those of the stage.
     """
 
     scene: JointScene

@@ -43,9 +43,7 @@ def sentence_of(result: Found, goal: Goal, study: ShimStudy) -> tuple[str, bool]
 
 
 def figures_of(study: ShimStudy, before: Sequence[Outcome], after: Sequence[Outcome]) -> dict[str, Any]:
-    """Of each patch, and of all, the largest figures in some cases without shims and in some with them; of a
-    volume the mean.
-    """
+    """The figures of each patch and of all, without and with shims: the largest, of a volume the mean."""
     count, joint = len(study.patches), study.bare.joint
     old, new = (np.array([row for one in some for row in one.further]) for some in (before, after))
     patches = [
@@ -80,8 +78,11 @@ def record_of(result: Found, study: ShimStudy) -> dict[str, Any]:
     return figures | {"samples": samples, "steps": steps}
 
 
-def as_solved(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:
-    """What `solve` says of the scene with shims, and the forces in its fasteners without and with them."""
+def solver_statements(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:
+    """The uncertainties that `solve` states for the scene with shims, and the forces in its fasteners.
+
+    The forces are those without and with shims.
+    """
     after: Any = read_scene(str(path))
     without = replace(after, effects=after.effects[: len(after.effects) - shims])
     answers = [solve(without), solve(after)]

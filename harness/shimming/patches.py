@@ -27,7 +27,10 @@ STOCK = "thicknesses above 0 mm in ascending order, as 0.2,0.3,0.5, or FIRST:LAS
 
 @dataclass(frozen=True)
 class Patch:
-    """outline : the corners of the shim as it is cut, mm. shim : the effect, 1 mm thick."""
+    """An area that a shim may fill.
+
+    outline : the corners of the shim as cut, mm. shim : the effect, 1 mm thick.
+    """
 
     name: str
     outline: tuple[Place, ...]

@@ -40,7 +40,7 @@ from problems.storage import digest
 
 from .each import each_joint
 from .gap_regions import patches_of_gap
-from .outcome import UNITS, as_solved, figures_of, record_of, sentence_of
+from .outcome import UNITS, figures_of, record_of, sentence_of, solver_statements
 from .patches import patches_of, stock_of
 from .search import ShimSearch
 from .study import ShimStudy
@@ -171,7 +171,7 @@ def shim(
     ]
     if touching:
         raise InputError(touching)
-    number = 1 if cases.are_one(read) else cases.count or RANDOM
+    number = 1 if cases.is_single(read) else cases.count or RANDOM
     wanted = recorded_form(directory / records.SHIMS, FORMS)
     form = chosen_form(read, FORMS, wanted, number * len(there)).form
     made = cases.of_search(read, form)
@@ -231,7 +231,7 @@ def shim(
         record |= asked | {"said": words, **stamp()}
         if not each:
             records.replace_text(directory / "shimmed.toml", text([study.effect(item) for item in plan]))
-            record |= as_solved(directory / "shimmed.toml", len(plan), allow_gap_mm)
+            record |= solver_statements(directory / "shimmed.toml", len(plan), allow_gap_mm)
         records.replace_object(directory / RECORD, record)
         sizes = {there[int(k)].name: t[0] if len(t) == 1 else tuple(t) for k, *t in plan}
         return Shimming(sizes, passed, words, write(directory))

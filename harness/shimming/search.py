@@ -44,7 +44,10 @@ ALL = inf, inf  # more than any cost
 
 @dataclass
 class ShimSearch(PlanSearch):
-    """stock : the thicknesses, mm, ascending."""
+    """Searches for shims of a stock.
+
+    stock : the thicknesses, mm, ascending.
+    """
 
     item = "shim"
     study: ShimStudy

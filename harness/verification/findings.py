@@ -32,7 +32,9 @@ MARGIN = 10.0  # by which an error may exceed the baseline's
 
 @dataclass(frozen=True)
 class Finding:
-    """One gated measurement, judged again. why : the reason if it failed. baseline_mm : its error there.
+    """One gated measurement, judged again.
+
+    why : the reason if it failed. baseline_mm : its error in the baseline.
     slowdown : S of slowdown.py if that is why. untimed : whether its time was to be compared and cannot be.
     """
 

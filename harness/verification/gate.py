@@ -62,7 +62,8 @@ class GateOutcome:
     findings : list of Finding
         One per gated row: its key, its judgement, its limit_mm, and why it has not passed.
     code : int
-        Exit code of the command: 0 passed, 1 accuracy lost, 3 nothing could be judged or a time not compared.
+        Exit code of the command: 0 passed, 1 accuracy lost or slower, 3 nothing judged or a time not
+        compared.
     sentences : tuple of str
         The outcome in words.
     """
@@ -73,7 +74,7 @@ class GateOutcome:
 
     @property
     def passed(self) -> bool:
-        """Whether every gated row is accurate enough."""
+        """Whether every gated row is accurate enough and, if asked, none slower than allowed."""
         return self.code == DONE
 
 

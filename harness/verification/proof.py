@@ -235,7 +235,7 @@ class Proof:
         return error if np.isfinite(error) else np.inf
 
     def _pushed(self, s: Vector, error: Vector, uncertain: Vector, lam: Vector) -> tuple[float, float]:
-        """‖x − x*‖_K or less, and its part that is due to the errors of s; all (m,)."""
+        """‖x − x*‖_K or more, √(N·mm), and its part due to the errors of s. All arguments are (m,)."""
         assert self.springs is not None
         push = Push.of(self.balanced, self.springs, nearly_closed(s, error, lam))
         return push.distance(s, error, lam), push.distance(np.where(uncertain > 0, 0, s), uncertain, lam)

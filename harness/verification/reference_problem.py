@@ -88,7 +88,7 @@ class ReferenceProblem:
         return replace(self, load=load, case=case, first=[])
 
     def judged(self, x: Vector, lam: Vector, limit_mm: float) -> Judgement:
-        """x of all unknowns of the form, mm; lam (m,) N, NaN if there are none."""
+        """The judgement of x (all unknowns of the form, mm) and lam (m,) N, NaN if there are none."""
         return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:

@@ -17,7 +17,7 @@ Answer = tuple[dict[str, Any], dict[str, Array]]
 
 
 def read(directory: Path) -> Answer:
-    """What solution.json and solution.npz hold."""
+    """The content of solution.json and solution.npz."""
     record = quoted(json.loads((directory / "solution.json").read_text("utf-8")))
     with np.load(directory / "solution.npz") as saved:
         return record, {name: saved[name] for name in saved.files}

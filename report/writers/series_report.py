@@ -42,7 +42,7 @@ CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": 
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report/report.md from the series in DIRECTORY, with index.html and sheet.pdf beside it.
 
-    Returns the path of the first.
+    Returns the path of report.md.
     """
     series = read(directory)
     target = emptied(directory / "report")

@@ -29,8 +29,8 @@ def write(
 ) -> tuple[Path, pd.DataFrame, list[str]]:
     """Write DIRECTORY/comparison.md, with index.html, from two of its folders.
 
-    Returns the path of the former, the figures per pair, and sentences on two meshes. weights : those of the
-    contacts of either answer at common places, pair by pair; None if their contacts are the same.
+    Returns the path of comparison.md, the figures per pair, and sentences on two meshes. weights : those of
+    the contacts of either answer at common places, pair by pair; None if their contacts are the same.
     """
     answers = [read(directory / folder) for folder in folders]
     common = answers if weights is None else [*map(_at_places, answers, zip(*weights, strict=True))]
