@@ -34,8 +34,8 @@ from harness.scene.stages import StageAnswer
 from harness.scene.stress import Stresses
 from harness.series.load_case_source import GapCases
 from harness.series.session import SeriesOptions
-from harness.shimming import run as shimming
-from harness.shimming.run import Shimming
+from harness.shimming import shim_run as shimming
+from harness.shimming.shim_run import Shimming
 from harness.solving.call_lock import in_turn
 from harness.terminal.console import ConsoleReporter
 from harness.verification import gate as gates

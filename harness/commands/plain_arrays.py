@@ -14,7 +14,7 @@ from harness.planning.form_choice import chosen_form
 from harness.scene.solution import Source, load_scene, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.call_lock import in_turn
-from harness.solving.session import forces_of, form_of
+from harness.solving.solver_session import forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import opened
 from problems.errors import InputError

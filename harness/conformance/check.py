@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.solving.session import SolverSession
 from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
+from harness.solving.solver_session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.errors import InputError
 from problems.forms.assembly import Vector

@@ -20,8 +20,8 @@ from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, cpu_model, resident_mib
 from harness.results.records import Row
 from harness.results.schema import Report
-from harness.solving.session import SolverSession
 from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures, save
+from harness.solving.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from harness.scene.solution import Solution
-from harness.solving.session import candidates
+from harness.solving.solver_session import candidates
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector

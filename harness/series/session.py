@@ -16,7 +16,7 @@ import threadpoolctl
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.results.series_file import Gaps
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import best_of_candidates, proof_of

@@ -18,8 +18,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.results.comparison import Side, floor_mm, measurement, read_side, refuse_incomparable
+from harness.results.counted_rows import counting
 from harness.results.records import Row, replace_text, to_line
-from harness.results.searches import counting
 from harness.terminal.console import legible
 
 from .judge import Judgement

@@ -18,9 +18,9 @@ from harness.planning.suite import RandomCases
 from harness.results import records
 from harness.results.answer_files import is_kept
 from harness.results.atomic_output import refuse_outputs
+from harness.results.counted_rows import counting
 from harness.results.records import Row
 from harness.results.row_validation import MEASUREMENT, refuse_wrong_kinds
-from harness.results.searches import counting
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from problems.errors import InputError

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.solving.session import candidates
+from harness.solving.solver_session import candidates
 from problems import storage
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.results.counted_rows import chosen
 from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, of_kind
-from harness.results.searches import chosen
 from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")

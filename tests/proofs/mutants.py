@@ -251,7 +251,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "reverse=True)[self.allowed]": ("reverse=True)[0]", "reverse=True)[self.allowed + 1]"),
         "round(self.gap_mm, DIGITS), self.plan": ("0.0, self.plan",),
     },
-    "harness/shimming/search.py": {
+    "harness/shimming/shim_search.py": {
         "figures[: len(self.study.masks)], ": ("figures[: len(self.study.masks) - 1], ",),
         "self.limit_mm * max(shares))": ("0.0)",),
         "len(order) - self.allowed]": ("len(order)]",),
@@ -277,7 +277,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "2 * first - low": ("low",),
         "max(range(len(regions)), key": ("min(range(len(regions)), key",),
     },
-    "harness/shimming/each.py": {
+    "harness/shimming/joint_shims.py": {
         "count - kept <= most": ("True", "count - kept < most"),
         "goal.failing(count, ALPHA)": ("goal.failing(count, 2 * ALPHA)",),
         "search.among(self.cases, 0)": ("search.among((0,), 0)",),
@@ -426,10 +426,10 @@ TESTS = {
         "harness/test_staged_random.py",
     ),
     "harness/placement/plan_search.py": ("harness/test_search.py", "harness/test_place.py"),
-    "harness/shimming/search.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
+    "harness/shimming/shim_search.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
     "harness/shimming/study.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
     "harness/shimming/gap_regions.py": ("harness/test_shim.py",),
-    "harness/shimming/each.py": ("harness/test_shim.py",),
+    "harness/shimming/joint_shims.py": ("harness/test_shim.py",),
     "problems/effects/shims.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
     "harness/placement/search.py": ("harness/test_search.py", "harness/test_place.py"),
     "harness/placement/fresh_cases.py": ("harness/test_place.py",),

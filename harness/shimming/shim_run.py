@@ -38,11 +38,11 @@ from problems.reporter import SILENT, Reporter
 from problems.scene_files import scene_of
 from problems.storage import digest
 
-from .each import each_joint
 from .gap_regions import patches_of_gap
+from .joint_shims import each_joint
 from .outcome import UNITS, figures_of, record_of, sentence_of, solver_statements
 from .patches import patches_of, stock_of
-from .search import ShimSearch
+from .shim_search import ShimSearch
 from .study import ShimStudy
 
 RECORD = "shim.json"

@@ -12,7 +12,7 @@ from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.reporter import Reporter
 from report.document.numbers import counted, out_of
 
-from .search import ShimSearch
+from .shim_search import ShimSearch
 from .study import ShimStudy
 
 TOGETHER = 20  # joints between two lines of progress
