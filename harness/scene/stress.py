@@ -223,7 +223,7 @@ def _sensitivity(S: sp.csr_array, at: slice, proof: Proof) -> Vector:
         z = units.solve(s)
         r = length(s - units.D * units.assembly.K.multiply(units.D * z))
         r += gamma(len(s) + 2) * (length(s) + units.stiffest * length(z))
-        norms[rows] = units.energy(z) + SAFE * r / np.sqrt(proof.kappa)
+        norms[rows] = units.energy_norm(z) + SAFE * r / np.sqrt(proof.kappa)
     xx, yy, xy = norms.reshape(-1, 3).T
     return np.asarray(SAFE * np.sqrt(1.5 * (xx**2 + yy**2) + 3 * xy**2))
 

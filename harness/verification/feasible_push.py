@@ -35,7 +35,7 @@ class Push:
 
     opening: Vector
     error: Vector
-    energy: float
+    energy_norm: float
 
     @classmethod
     def of(cls, units: Balanced, springs: Springs, closed: Mask) -> "Push":
@@ -53,7 +53,7 @@ class Push:
             p, opening = p + share * step, opening + share * change
         roundings = np.diff(units.At.indptr)
         error = SAFE * (gamma(roundings) * (abs(units.At) @ abs(p)) + roundings * ETA)
-        return cls(units.At @ p, error, float(units.energy(p[:, None])[0]))
+        return cls(units.At @ p, error, float(units.energy_norm(p[:, None])[0]))
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def distance(self, s: Vector, error: Vector, lam: Vector) -> float:
@@ -65,7 +65,7 @@ class Push:
         if closing.any() or not (opening[overlap] > 0).all():
             return np.inf
         gap = float(lam @ (abs(s) + error + theta * (abs(self.opening) + self.error)))
-        return float(SAFE * np.sqrt((theta * self.energy) ** 2 + 2 * SAFE * gap + len(s) * ETA))
+        return float(SAFE * np.sqrt((theta * self.energy_norm) ** 2 + 2 * SAFE * gap + len(s) * ETA))
 
 
 def nearly_closed(s: Vector, error: Vector, lam: Vector) -> Mask:
