@@ -39,7 +39,7 @@ BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases
 KEPT_ANSWERS = 32  # for warm starts: memory does not grow with the number of cases
 
 
-Report = Callable[..., None]
+ReportEvent = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -121,11 +121,11 @@ class SeriesSession(Reporter):
     """
 
     def __init__(
-        self, job: Job, solver: Solver | None = None, report: Report | None = None, batched: bool = True
+        self, job: Job, solver: Solver | None = None, report: ReportEvent | None = None, batched: bool = True
     ) -> None:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
-        self.report: Report = report or (lambda **event: None)
+        self.report: ReportEvent = report or (lambda **event: None)
         self.block_time_s = 0.0 if report else BLOCK_TIME_S
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)

@@ -22,7 +22,7 @@ from problems.stiffness import gamma
 
 from .balanced_units import Balanced
 from .enclosure import ETA, SAFE
-from .sprung_contacts import Springs
+from .sprung_contacts import SprungFactors
 
 NEARLY_CLOSED = 2.0**20  # times the largest overlap: a larger gap stays open
 LONGEST, ENOUGH = 5.0, 0.1  # of a_jᵀp in a step, and at the end
@@ -38,7 +38,7 @@ class Push:
     energy_norm: float
 
     @classmethod
-    def of(cls, units: Balanced, springs: Springs, closed: Mask) -> "Push":
+    def of(cls, units: Balanced, springs: SprungFactors, closed: Mask) -> "Push":
         """The push that opens the contacts `closed` (m,)."""
         sprung, A = springs.sprung, springs.sprung.A
         p, opening = np.zeros(A.shape[0]), np.zeros(A.shape[1])

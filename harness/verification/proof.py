@@ -44,7 +44,7 @@ from .balanced_units import Balanced
 from .closed_contacts import ClosedContacts, ScaledInverse
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
 from .feasible_push import Push, nearly_closed
-from .sprung_contacts import Springs, SprungContacts
+from .sprung_contacts import SprungContacts, SprungFactors
 
 MAX_PASSES = 30
 MAX_WORSE = 3  # passes in a row that do not halve the bound of the last: contact sets may still change
@@ -94,7 +94,7 @@ class Proof:
         return ScaledInverse.of(self.balanced.prepared, self.balanced.R[:, 0])
 
     @cached_property
-    def springs(self) -> Springs | None:
+    def springs(self) -> SprungFactors | None:
         """K with springs, where K is sparse and there is neither M nor Q, or it is dense and small and the
         contacts are almost dependent.
         """
@@ -102,7 +102,7 @@ class Proof:
         sprung = inverse.M is None and inverse.Q is None
         if assembly.K.dense:
             sprung = assembly.n <= FEW and self.balanced.sigma2 == 0
-        return Springs(self.balanced, self.kappa) if sprung else None
+        return SprungFactors(self.balanced, self.kappa) if sprung else None
 
     @property
     def pushes(self) -> bool:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from report.document.numbers import significant
-from report.results.answer_record import STRESS, Answer, pair_name, stages, stress_map, von_mises
+from report.results.answer_record import STRESS, SavedAnswer, pair_name, stages, stress_map, von_mises
 
 from . import style
 from .deformed_faces import deformed_figure
@@ -56,7 +56,9 @@ def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str
         return figures | {"displacement": _displacement(record, arrays)}
 
 
-def _pairs(title: str, answer: Answer, values: Array, scale: Scale, outlines: Outlines = ()) -> list[Map]:
+def _pairs(
+    title: str, answer: SavedAnswer, values: Array, scale: Scale, outlines: Outlines = ()
+) -> list[Map]:
     """A map of each pair of parts. values, and the masks of the outlines : of all contacts."""
     record, arrays = answer
     maps = []
@@ -174,7 +176,7 @@ def _marks(record: dict[str, Any], part: dict[str, Any]) -> Marks:
     return record["marks"] | ({"supports": part["supports"]} if part["supports"] else {})
 
 
-def gap_maps(answers: list[Answer], names: list[str], common: list[Answer]) -> dict[str, Figure]:
+def gap_maps(answers: list[SavedAnswer], names: list[str], common: list[SavedAnswer]) -> dict[str, Figure]:
     """`gaps`, all pairs of two scenes on one scale; `difference`, second minus first at common places."""
     (_, one), (_, other) = answers
     scale = rooted("gap, mm", "viridis", one["gap_after"], other["gap_after"])

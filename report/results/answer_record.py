@@ -13,10 +13,10 @@ from report.document.numbers import position
 
 from .series_results import Array
 
-Answer = tuple[dict[str, Any], dict[str, Array]]
+SavedAnswer = tuple[dict[str, Any], dict[str, Array]]
 
 
-def read(directory: Path) -> Answer:
+def read(directory: Path) -> SavedAnswer:
     """The content of solution.json and solution.npz."""
     record = quoted(json.loads((directory / "solution.json").read_text("utf-8")))
     with np.load(directory / "solution.npz") as saved:
