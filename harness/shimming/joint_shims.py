@@ -48,7 +48,7 @@ def each_joint(
         for k, one in enumerate(after)
     ]
     kept, pieces = sum(one.largest[0] <= limit for one in after), sum(len(one.plan) for one in after)
-    most = goal.failing(count, ALPHA)
+    most = goal.allowed_fresh(count, ALPHA)
     if isinstance(study.cases, MeasuredGaps):  # there are no others
         most = floor((1 - goal.share) * count + 1e-9)
     low, high = share_interval(kept, count, method="exact")

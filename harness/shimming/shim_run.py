@@ -184,12 +184,12 @@ def shim(
     also = "".join(f", {most:g} {unit}" for most, unit in zip(limits, UNITS, strict=True) if most < inf)
     goal = Goal(allow_gap_mm, Goal.share_of(share, made.count), also=also)
     study = ShimStudy(bare, made, form, there, limits, read, 1 + taper)
-    if each and not listed and goal.failing(made.count, ALPHA) < 0:
+    if each and not listed and goal.allowed_fresh(made.count, ALPHA) < 0:
         allowed = f"{made.count} cases cannot show it: take {goal.least(ALPHA / 2)}, or a share of 1"
         raise InputError.one("--share", "share", goal.share, allowed)
-    order = Cases(range(made.count), made.count) if each else Cases.of(made.count, listed, goal)
+    case_numbers = Cases(range(made.count), made.count) if each else Cases.of(made.count, listed, goal)
     if patches is None:
-        gap = PlanSession(study).largest_gap(order.numbers[: order.choosing])
+        gap = PlanSession(study).largest_gap(case_numbers.numbers[: case_numbers.choosing])
         there = patches_of_gap(bare.joint, gap, allow_gap_mm) or there
         study = replace(study, patches=there)
     law = other_gaps(bare, made)
@@ -206,7 +206,7 @@ def shim(
     without = "" if each else text([])  # refused now rather than after the search
     asked |= {"share": goal.share, "stock": list(thicknesses), "each": each, "taper": taper}
     identity = asked | {"patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}"} | study.identity
-    if order.table:
+    if case_numbers.table:
         reporter.say(HELD_BACK)
     with records.locked(directory, records.SHIMS, outputs=OUTPUTS):
         if not each:
@@ -221,7 +221,7 @@ def shim(
                 record |= {"forces": [], "sure": ["Solver: every gap is a proven upper bound", MESH]}
             else:
                 search = ShimSearch(journal, 0, 0, allow_gap_mm, study, thicknesses, reporter=reporter)
-                result = search_in_rounds(search, (), goal, order)
+                result = search_in_rounds(search, (), goal, case_numbers)
                 plan, record = result.best.plan if result.best else (), record_of(result, study)
                 words, passed = sentence_of(result, goal, study)
         from report.writers.shim_report import write  # slow to import: not before the search

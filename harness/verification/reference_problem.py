@@ -103,10 +103,10 @@ class ReferenceProblem:
         return self.judged(x, lam, limit_mm)
 
 
-def opened(
+def open_problem(
     scene: Scene, form: Form = "dual", reporter: Reporter = SILENT, limit_s: float | None = None
 ) -> ReferenceProblem:
-    """Open or build a scene, of one with stages the last; see `open_stage`. Raises InputError."""
+    """Open or build the problem of a scene, or of its last stage; see `open_stage`. Raises InputError."""
     return replace(open_stage(last_stage(scene, limit_s), form, reporter, limit_s), scene=scene)
 
 
@@ -163,7 +163,7 @@ def measurable(
     """Open or build a scene, or that of a name or path, that a solver can be measured on. Raises InputError,
     also if K is not positive definite.
     """
-    problem = opened(read_scene(source) if isinstance(source, str) else source, form, reporter, limit_s)
+    problem = open_problem(read_scene(source) if isinstance(source, str) else source, form, reporter, limit_s)
     refuse_without_contacts(problem.prepared, problem.scene.source_of("A"))
     reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()

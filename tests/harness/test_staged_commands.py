@@ -20,7 +20,7 @@ from harness.scene.mesh_error import on_mesh
 from harness.scene.solution import solve
 from harness.scene.solve import solve_into
 from harness.terminal import FAILED, GAP_EXCEEDED
-from harness.verification.reference_problem import last_stage, opened
+from harness.verification.reference_problem import last_stage, open_problem
 from problems.forms import Form
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
@@ -65,7 +65,7 @@ def staged(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_the_problem_is_the_last_stage(staged: Path, form: Form) -> None:
     scene, answer = read_scene(str(staged)), solve(str(staged), form=form)
-    problem = opened(scene, form)
+    problem = open_problem(scene, form)
     assert problem.scene.key == scene.key
     assert abs(problem.load.f - answer.problem.load.f).max() <= 1e-8
     x = problem.prepared.assembly.at_junction(problem.reference.x)
@@ -83,7 +83,7 @@ def test_what_is_measured_is_the_last_stage(staged: Path, tmp_path: Path) -> Non
     (load,) = load_cases(scene, measurements)
     assert isinstance(scene, JointScene)
     assert scene.stages == ()
-    np.testing.assert_array_equal(load.f, opened(read_scene(str(staged))).load.f)
+    np.testing.assert_array_equal(load.f, open_problem(read_scene(str(staged))).load.f)
 
 
 def test_export_is_the_last_stage(staged: Path, tmp_path: Path) -> None:

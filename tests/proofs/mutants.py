@@ -279,7 +279,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "harness/shimming/joint_shims.py": {
         "count - kept <= most": ("True", "count - kept < most"),
-        "goal.failing(count, ALPHA)": ("goal.failing(count, 2 * ALPHA)",),
+        "goal.allowed_fresh(count, ALPHA)": ("goal.allowed_fresh(count, 2 * ALPHA)",),
         "search.among(self.cases, 0)": ("search.among((0,), 0)",),
     },
     "problems/effects/shims.py": {
