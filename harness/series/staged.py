@@ -6,7 +6,7 @@ s have locked in this case. If effects are random, the cases say what acts in s.
 its factors and the state of the solver.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Generic, TypeVar
@@ -97,6 +97,17 @@ class OpenStage(Generic[S]):
         return assembly.from_junction(self.springs.T @ (self.springs.k[:, None] * approaches))
 
 
+def shared_session(
+    scene: JointScene, opened: Iterable[tuple[JointScene, S]], make: Callable[[JointScene], S]
+) -> S:
+    """The session of a stage: that of one with the same K, or else a new one.
+
+    opened : the scenes of stages, each with its session. make : makes the session of a scene.
+    """
+    shared = (session for other, session in opened if shares_stiffness(scene, other))
+    return next(shared, None) or make(scene)
+
+
 class OpenStages(Generic[S]):
     """The stages opened so far, each once; those with the same K share a session, which `make` makes.
 
@@ -112,8 +123,8 @@ class OpenStages(Generic[S]):
         if (key := (part.key, part.origin)) not in self.stages:
             springs = Springs.of(part)
             bare = locked(part, np.zeros(len(springs.k)))
-            shared = (one.session for one in self.stages.values() if shares_stiffness(bare, one.scene))
-            session, load = next(shared, None) or self.make(bare), load_case(bare, self.form)
+            opened = ((one.scene, one.session) for one in self.stages.values())
+            session, load = shared_session(bare, opened, self.make), load_case(bare, self.form)
             self.stages[key] = OpenStage(bare, session, load.f, load.g - self.gap, springs)
         return self.stages[key]
 
