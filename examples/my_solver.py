@@ -13,8 +13,8 @@ C are the closed contacts. If C repeats itself, λ is the exact answer, up to ro
 instead; then it stops at the limit of contact sets.
 
 Only `solve` is required. All arrays that a solver is given are read-only and shared: copy before writing.
-Lengths and forces, and the tolerance with them, come multiplied by powers of two; for a joint in mm and N they
-hardly change.
+Lengths and forces, and the tolerance with them, come multiplied by powers of two; for a joint in mm and N
+they hardly change.
 """
 
 from __future__ import annotations

@@ -9,9 +9,9 @@
 
 A problem is min ½xᵀKx − fᵀx subject to Aᵀx ≤ g: x (n,) displacements in mm, λ (m,) contact forces in N,
 g (m,) initial gaps in mm, f (n,) loads in N. A `scene` argument is a Scene, the name of a packaged one, the
-path of a .toml or .npz file, or a dict with the content of a scene's file. That of `place` and `shim` has a
-file, whose text they write anew; that of `random_gaps` is a Scene. All faults of an input are in one
-InputError. Matrices are cached as by the command line. Arrays are copied, and threads take turns
+path of a .toml or .npz file, or a dict with the content of a scene's file. `place` and `shim` need a scene
+that has a file, whose text they write anew; `random_gaps` takes a Scene only. All faults of an input are in
+one InputError. Matrices are cached as by the command line. Arrays are copied, and threads take turns
 (solving/call_lock.py).
 """
 
@@ -34,8 +34,8 @@ from harness.scene.stages import StageAnswer
 from harness.scene.stress import Stresses
 from harness.series.load_case_source import GapCases
 from harness.series.session import SeriesOptions
-from harness.shimming import run as shimming
-from harness.shimming.run import Shimming
+from harness.shimming import shim_run as shimming
+from harness.shimming.shim_run import Shimming
 from harness.solving.call_lock import in_turn
 from harness.terminal.console import ConsoleReporter
 from harness.verification import gate as gates

@@ -1,1 +1,1 @@
-"""Markdown and pictures from results; reads nothing else."""
+"""Reports from results: Markdown, pictures, CSV, pages in HTML, sheets in PDF; reads nothing else."""

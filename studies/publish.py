@@ -229,9 +229,9 @@ def write_index(folder: Path) -> Path:
         lines.append(line | {"rows": len(rows)} | {verdict: verdicts[verdict] for verdict in VERDICTS})
     machines = _machines([row for rows in published.values() for row in rows])
     text = (
-        f"# Published results\n\nMeasured on {len(machines)} machines: {'; '.join(machines)}. Each row names its "
-        "machine; a series (`gaps…`) has it in `series.sqlite`, and no day. `python -m harness report DIRECTORY` "
-        "draws the report of a suite from its rows.\n\n"
+        f"# Published results\n\nMeasured on {len(machines)} machines: {'; '.join(machines)}. Each row "
+        "names its machine; a series (`gaps…`) has it in `series.sqlite`, and no day. "
+        "`python -m harness report DIRECTORY` draws the report of a suite from its rows.\n\n"
     )
     table = pd.DataFrame(lines).rename(columns=lambda name: name.replace("_", " "))
     path = folder / "index.md"

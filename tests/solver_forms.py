@@ -7,7 +7,7 @@ import numpy as np
 from exact_draws import ExactLoad
 from small_problems import problem_in
 
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from harness.verification.judge import LIMIT_MM, conditioned_limit
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared

@@ -55,7 +55,7 @@ def shim(
     with error_reporting(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
-        from harness.shimming.run import shim as find_shims
+        from harness.shimming.shim_run import shim as find_shims
         from harness.terminal.console import ConsoleReporter, show_verdict
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -4,10 +4,12 @@ Each value v of an even grid is a series of the same N load cases: case k depend
 k(v) of them the gap is proven to be within the limit. If one end of the range keeps it in a share s of the
 cases and the other does not, bisection finds neighbours v, v' of the grid with k(v) ≥ sN > k(v').
 
-Bisection for the least k whose interval begins at s or above, and for the least whose interval reaches s,
-bounds the value with 95 % confidence, if the share changes one way. Fresh cases, those of the next seed, tell
-the share at v: if their interval is below s, v moves half-way to the end where the share is surely kept, and
-so on. Rows of a table chose v themselves.
+Two more bisections bound the value. One takes for sN the least k whose confidence interval begins at s or
+above, the other the least k whose interval reaches s. If the share is monotone in v, the value lies between
+their results with 95 % confidence.
+
+Fresh cases, those of the next seed, tell the share at v: if their interval is below s, v moves half-way to
+the end where the share is surely kept, and so on. Rows of a table chose v themselves.
 """
 
 from bisect import bisect_left

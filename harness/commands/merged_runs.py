@@ -31,9 +31,9 @@ def merge(names: Sequence[str], out: Path) -> Path:
         if (folder / SUITE).is_file():
             read_written(folder / SUITE)
     rows = [row | dict.fromkeys(("answer", "log")) for side in sides for row in side.rows]
-    ((place, count),) = Counter((row.get("key"), row.get("machine")) for row in rows).most_common(1)
+    (((key, machine), count),) = Counter((row.get("key"), row.get("machine")) for row in rows).most_common(1)
     if count > 1:
-        raise Incomparable.one(" ".join(names), "key", place[0], f"one row of {place[1]}, not {count}")
+        raise Incomparable.one(" ".join(names), "key", key, f"one row of {machine}, not {count}")
     if (out / records.MEASUREMENTS).exists():
         raise InputError.one("--out", "directory", str(out), f"has rows: {records.OTHER}")
     with records.locked(out, folders=("scenes",), outputs=("report", SUITE)):

@@ -14,9 +14,9 @@ from harness.planning.form_choice import chosen_form
 from harness.scene.solution import Source, load_scene, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.call_lock import in_turn
-from harness.solving.session import forces_of, form_of
+from harness.solving.solver_session import forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
-from harness.verification.reference_problem import opened
+from harness.verification.reference_problem import open_problem
 from problems.errors import InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Vector
@@ -117,7 +117,7 @@ def judge(
     'outside'
     """
     scene = load_scene(scene)
-    problem = opened(scene, chosen_form(scene, FORMS, form).form)
+    problem = open_problem(scene, chosen_form(scene, FORMS, form).form)
     n, m = problem.prepared.assembly.n, problem.prepared.assembly.m
     x = _vector("judge", "x", x, n)
     forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.solving.session import SolverSession
 from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
+from harness.solving.solver_session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.errors import InputError
 from problems.forms.assembly import Vector
@@ -167,7 +167,7 @@ def inspect(answer: Answer, trial: KnownProblem, case: KnownCase, form: Form) ->
         words = f'status is "{plain.status}" beside a right answer'
         return finding(words, "Say solved when the tolerance is met")
     if (smallest := float(plain.lam.min())) < -10 * TOLERANCE:
-        return finding(f"λ is as low as {smallest:.3g} N", "Contacts only push: λ ≥ 0 in both forms")
+        return finding(f"λ is as low as {smallest:.3g} N", "Contacts only push: λ ≥ 0 in every form")
     return None
 
 

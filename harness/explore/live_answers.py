@@ -17,11 +17,12 @@ from harness.placement.candidates import movable_fasteners
 from harness.planning.form_choice import chosen_form
 from harness.scene.scene_file import MOVED, of_kind, with_fasteners
 from harness.scene.solution import Source, load_scene
+from harness.series.staged import shared_session
+from harness.series.stiffness_session import StiffnessSession
 from harness.solving.call_lock import in_turn
-from harness.verification.assess import GapError, assess
+from harness.verification.assess import assess
 from harness.verification.judge import LIMIT_MM
-from harness.verification.reference import proof_of
-from problems.build import adopts_model, load_case, prepared
+from problems.build import load_case
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
@@ -33,7 +34,6 @@ from problems.model.effect import Effect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import Elongations, locked, through
 from problems.model.stages import StagePlan
-from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import DualStart
 
 TOLERANCE_MM, PROVEN_MM = 1e-5, 1e-9  # of the first answer, and of the proven one
@@ -43,7 +43,7 @@ PAGE = "page"  # where a wrong value was given
 
 @dataclass(frozen=True)
 class Settings:
-    """What may change of a scene while it is explored.
+    """The values of a scene that may change while it is explored.
 
     Parameters
     ----------
@@ -186,8 +186,8 @@ class Explorer:
         self.data = self.sessions[-1].data
 
     def _opened(self, part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
-        shared = (one for one in self.sessions if adopts_model(part, one.scene))
-        self.sessions.append(next(shared, None) or _Session(part, self.form))
+        opened = ((one.scene, one) for one in self.sessions)
+        self.sessions.append(shared_session(part, opened, lambda scene: _Session(scene, self.form)))
         return lambda T: np.zeros((T.shape[1], 1)), None
 
     @in_turn
@@ -251,14 +251,11 @@ class Explorer:
         return replace(stages[-1], stages=tuple(stages) if scene.stages else (), starts=tuple(starts))
 
 
-class _Session:
-    """What stages with the same K share. scene : one of them."""
+class _Session(StiffnessSession):
+    """Stages with the same K, and the forces and gaps of their effects. scene : one of these stages."""
 
     def __init__(self, scene: JointScene, form: Form) -> None:
-        self.scene, self.form = scene, form
-        self.data = prepared(scene, form=form)
-        self.sweeps = Sweeps(self.data)
-        self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
+        super().__init__(scene, form)
         self.contribution = lru_cache(maxsize=256)(self._contribution)
 
     def load(self, effects: Iterable[Effect], near: DualStart | None) -> DualLoadCase:

@@ -149,7 +149,7 @@ class Page:
         return place if place in self.first.places else (round(x, DIGITS), round(y, DIGITS))
 
     def changed(self, attr: str, old: object, new: object) -> None:
-        """LiveAnswer what the page asks for, or say what is wrong with it."""
+        """Answer what the page asks for, or say what is wrong with it."""
         self.colours.high = float(self.sliders["limit"].value)
         try:
             if self.settings != self.answer.settings:

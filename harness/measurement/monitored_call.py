@@ -58,7 +58,8 @@ class Monitored:
     ----------
     function : of a module; called in the child (child_process.py) with `job` and an `Events`.
     job : anything that can be pickled. threads : for linear algebra.
-    phases : the limit on each phase, s; an event with `phase` starts the next one, of `times` that limit.
+    phases : the limit on each phase, s; an event with `phase` starts the next one, with `times` times that
+        limit.
     python : the interpreter (environments.py).
     """
 

@@ -190,8 +190,10 @@ def resumed(
 
 
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
-    """Whether a row is of another scene, series, solver or accuracy, or hit a limit that is wider now, or
-    was not run by an older version.
+    """Whether a row has to be measured again.
+
+    It is of another scene, series, solver or accuracy, hit a limit that is wider now, or has the status
+    `not_run` of older versions.
     """
     current = {
         "scene_key": scene_key,

@@ -164,7 +164,7 @@ class Measuring:
         for batch in batches(remaining):
             m = still_needed(batch[0], self.rows)
             if m is None:
-                self.display.passed_over(len(batch))
+                self.display.advance(len(batch))
                 continue
             ours = m.entry.beside or self.solvers[m.solver, m.entry.label].owner == "ours"
             if ours or not any(entry.beside for entry in m.suite.solver):

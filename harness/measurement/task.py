@@ -18,7 +18,7 @@ from problems.build import prepared
 from problems.forms.problem import in_form
 
 from .solver_descriptions import Description
-from .worker import Outcome, measure, scene_to_measure
+from .worker import FinishedReport, measure, scene_to_measure
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class TaskResult:
     files, machine, code : from a worker of a scheduler, with None for an answer that has no file.
     """
 
-    reports: list[Outcome]
+    reports: list[FinishedReport]
     elapsed_s: float
     files: list[bytes | None] | None = None
     machine: dict[str, Any] | None = None
@@ -46,7 +46,7 @@ class TaskResult:
 def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into the directory `answers`."""
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
-    reports: list[Outcome]
+    reports: list[FinishedReport]
     if task.solver.failure:
         reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
     elif batch[0].form in forms:
@@ -93,7 +93,7 @@ def why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | Non
 def _row(
     m: Measurement,
     answer: Path,
-    report: Outcome,
+    report: FinishedReport,
     solver: Description,
     problem: ReferenceProblem,
     elapsed_s: float,

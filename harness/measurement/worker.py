@@ -20,8 +20,8 @@ from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, cpu_model, resident_mib
 from harness.results.records import Row
 from harness.results.schema import Report
-from harness.solving.session import SolverSession
 from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures, save
+from harness.solving.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
@@ -44,7 +44,7 @@ YARDSTICK_REPEATS = 3
 SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib", "device")
 
 
-class Outcome(Report, total=False):
+class FinishedReport(Report, total=False):
     """A report at its end.
 
     cannot_save : why the answer's file cannot be written, which ends the run. printed : by the process, with
@@ -61,13 +61,13 @@ class Unsupported(InvalidAnswer):
     status = "unsupported"
 
 
-def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Outcome]:
+def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[FinishedReport]:
     """Run measurements in one process: one, or load cases of a series. Each answer is saved.
 
     Returns the process's part of each row: status, message, times, peak memory. If a load case ends the
     process, the following ones have its status.
     """
-    first, finished, fields = measurements[0], list[Outcome](), Row()
+    first, finished, fields = measurements[0], list[FinishedReport](), Row()
     phases = {"start": START_S, "solve": first.time_limit_s * (first.entry.batched or 1), "save": SAVE_S}
     job = measurements, answers
     python = interpreter(first.entry.requirements or ())
@@ -76,7 +76,7 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
         for event in process:
             fields |= event
             if "status" in event:
-                finished.append(cast(Outcome, fields))
+                finished.append(cast(FinishedReport, fields))
                 fields = {name: fields[name] for name in SHARED if name in fields}
             if len(finished) == len(measurements):
                 break
@@ -87,7 +87,7 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
             last["message"] = f"{last['message']}; iterations and error are unknown"
         finished[0]["printed"] = process.log
     ended = measurements[len(finished) - 1].key
-    lost: Outcome = {"status": last["status"], "message": f"not run: {ended} ended the process"}
+    lost: FinishedReport = {"status": last["status"], "message": f"not run: {ended} ended the process"}
     return finished + [lost] * (len(measurements) - len(finished))
 
 
@@ -111,8 +111,8 @@ class Run(Reporter):
         yield
         self.events.report(**{name: more_s + time.perf_counter() - start})
 
-    def outcomes(self) -> Iterator[Outcome]:
-        """Solve the load cases: the last event of each."""
+    def outcomes(self) -> Iterator[FinishedReport]:
+        """Solve the load cases; yields the last event of each row."""
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
         solver = make_solver(m.solver, m.entry.options, plugin)
@@ -143,8 +143,8 @@ class Run(Reporter):
                 stored.check()
                 yield outcome
 
-    def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Outcome:
-        """Solve one load case and save its answer: the last event."""
+    def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> FinishedReport:
+        """Solve one load case and save its answer; returns the last event of its row."""
         problem = session.problem
         start = time.perf_counter()
         (load,) = problem.loads([case])
@@ -166,7 +166,7 @@ class Run(Reporter):
 
     def solved_batch(
         self, session: SolverSession, cases: Sequence[LoadCase], answer_files: Sequence[Path]
-    ) -> Iterator[Outcome]:
+    ) -> Iterator[FinishedReport]:
         """Solve load cases at once and save their answers; each has an equal share of the time."""
         problem = session.problem
         start = time.perf_counter()
@@ -198,8 +198,8 @@ class Run(Reporter):
 
     def saved(
         self, answer: Answer, x: Vector | None, file: Path, problem: Problem, fields: Report
-    ) -> Outcome:
-        """Report the figures of an answer, and save it: the last event."""
+    ) -> FinishedReport:
+        """Report the figures of an answer, and save it; returns the last event of its row."""
         stages = " ".join(problem.prepared.opened)
         peak = resident_mib("VmHWM")
         self.events.report(phase="save")

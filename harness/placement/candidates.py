@@ -29,7 +29,9 @@ DIGITS = 6  # of a place in mm: to the nanometre
 
 @dataclass(frozen=True)
 class MovableFasteners:
-    """scene : with its stages. bare : what else acts in the last one. fastener : one of them, for its preload
+    """The scene and those of its fasteners that can move.
+
+    scene : with its stages. bare : what else acts in the last one. fastener : one of them, for its preload
     and the parts that it joins. current : the places where the scene has them.
     """
 

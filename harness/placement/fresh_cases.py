@@ -35,8 +35,10 @@ MOST = 10**7  # fresh cases
 
 @dataclass(frozen=True)
 class Goal:
-    """What is searched for: the fewest fasteners with which at least `share` of the cases keep limit_mm, or
-    the best plan of `count` fasteners. also : other limits, in words.
+    """The aim of a search.
+
+    The fewest fasteners with which at least `share` of the cases keep limit_mm, or the best plan of `count`
+    fasteners. also : other limits, in words.
     """
 
     limit_mm: float | None
@@ -49,7 +51,7 @@ class Goal:
         """The share that is asked for, by default 0.95, of a single case 1."""
         return share or (1.0 if cases == 1 else SHARE)
 
-    def allowed(self, cases: int) -> int:
+    def allowed_choosing(self, cases: int) -> int:
         """How many of the `cases` that choose a plan may fail. Raises InputError if they are too few to show
         the share.
         """
@@ -73,7 +75,7 @@ class Goal:
         )
         return next(n for c, n in sizes if binom.cdf(c, n, q / 2) >= POWER)
 
-    def failing(self, cases: int, alpha: float) -> int:
+    def allowed_fresh(self, cases: int, alpha: float) -> int:
         """c, how many of the fresh `cases` may fail; -1 if they are too few to show the share."""
         from scipy.stats import binom
 
@@ -98,12 +100,12 @@ class Cases:
         show the share.
         """
         if table and count > 1:
-            if goal.failing(count // 2, ALPHA) < 0:
+            if goal.allowed_fresh(count // 2, ALPHA) < 0:
                 least = 2 * goal.least(ALPHA / 2)
                 allowed = f"half of {count} rows are held back: take {least} rows, or a share of 1"
                 raise InputError.one("--share", "share", goal.share, allowed)
             return cls([*range(0, count, 2), *range(1, count, 2)], count - count // 2, True)
-        goal.allowed(count)
+        goal.allowed_choosing(count)
         return cls(range(MOST if count > 1 else 1), count)
 
 
@@ -130,7 +132,7 @@ class Sample:
         """fresh : which of the cases' numbers."""
         numbers = cases.numbers[fresh]
         count = len(numbers)
-        step = search.among(numbers, goal.failing(count, alpha)).whole(plan, "fresh cases")
+        step = search.among(numbers, goal.allowed_fresh(count, alpha)).whole(plan, "fresh cases")
         limit = step.gap_mm if goal.limit_mm is None else goal.limit_mm
         kept = sum(gap <= limit for gap in step.outcome.largest)
         interval = share_interval(kept, count, 1 - alpha, "exact")
@@ -152,7 +154,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchOutcome:
     """The outcome of all rounds.
 
     steps : of the last search, in the load cases `numbers`. best : None if not even all candidates keep the
@@ -167,13 +169,13 @@ class Found:
     order: list[Step]
 
 
-def search_in_rounds(search: PlanSearch, current: Plan, goal: Goal, cases: Cases) -> Found:
+def search_in_rounds(search: PlanSearch, current: Plan, goal: Goal, cases: Cases) -> SearchOutcome:
     """Search, and let fresh cases decide, until a plan passes or no round is left. current : the scene's own
     plan, for comparison.
     """
     used, choosing, samples = cases.choosing, cases.choosing, list[Sample]()
     while True:
-        now = search.among(cases.numbers[:choosing], goal.allowed(choosing))
+        now = search.among(cases.numbers[:choosing], goal.allowed_choosing(choosing))
         steps, best = now.once(current, goal.count)
         enough = more_may_help = goal.limit_mm is None or best.gap_mm <= goal.limit_mm
         if len(cases.numbers) == 1:
@@ -191,4 +193,4 @@ def search_in_rounds(search: PlanSearch, current: Plan, goal: Goal, cases: Cases
         used = max(used + count, choosing)
     none = best is steps[0] and not enough
     order = [] if none else now.order_of(best)
-    return Found(steps, cases.numbers[:choosing], None if none else best, samples, order)
+    return SearchOutcome(steps, cases.numbers[:choosing], None if none else best, samples, order)

@@ -1,4 +1,4 @@
-"""What searches for a plan share: outcomes in all load cases or in some, proven plans, their worst cases."""
+"""The base of searches for a plan: outcomes in all load cases or in some, proven plans, their worst cases."""
 
 import itertools
 from abc import ABC, abstractmethod
@@ -29,8 +29,8 @@ class Step:
     outcome: Outcome
     moved: str = ""
 
-    def order(self) -> tuple[float, Plan]:
-        """The least gap first."""
+    def sort_key(self) -> tuple[float, Plan]:
+        """The key by which plans are sorted: the least gap first."""
         return round(self.gap_mm, DIGITS), self.plan
 
     @property
@@ -64,7 +64,7 @@ class PlanSearch(ABC):
         return f"{step.gap_mm:.3g} mm"
 
     def order_of(self, best: Step) -> list[Step]:
-        """The plans with 0, 1, … items set, up to the best."""
+        """The plans in the order of setting their items, the best last; by default the best alone."""
         return [best]
 
     def gap(self, outcome: Outcome) -> float:

@@ -16,7 +16,7 @@ from harness.measurement.scheduler import workers
 from harness.measurement.solver_descriptions import described
 from harness.placement.answer_journal import AnswerJournal, recorded_form
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
-from harness.placement.fresh_cases import Cases, Found, Goal, search_in_rounds
+from harness.placement.fresh_cases import Cases, Goal, SearchOutcome, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.search_record import identity_of, record_of, sentence_on
 from harness.placement.session import THREADS, FastenerStudy
@@ -139,7 +139,7 @@ def place(
     refuse_inputs([*(directory / name for name in OUTPUTS), *report_files], inputs)
     movable, source = MovableFasteners.of(read), file_of(scene, read)
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
-    single = cases.are_one(movable.bare)
+    single = cases.is_single(movable.bare)
     faults = cases.faults(table=candidates is not None and Path(candidates).is_file())
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
@@ -159,7 +159,7 @@ def place(
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
     goal = Goal(allow_gap_mm, Goal.share_of(share, study.cases.count), count)
-    order = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
+    case_numbers = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
     law = other_gaps(study.bare, study.cases)
     preload: Any = movable.fastener.preload
 
@@ -169,7 +169,7 @@ def place(
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
     identity = identity_of(study, movable.current, holes, goal) | facts
-    if order.table:
+    if case_numbers.table:
         reporter.say(HELD_BACK)
     console = console_of(reporter)
     with records.locked(directory, records.PLANS, outputs=(*OUTPUTS, *SERIES, "report")):
@@ -181,7 +181,7 @@ def place(
             journal = AnswerJournal(study, directory / records.PLANS, identity, executor)
             whole = journal, 0, 0, goal.limit_mm or 0.0
             search = Search(*whole, study.bare, nodes, holes, reporter=reporter)
-            result = search_in_rounds(search, movable.current, goal, order)
+            result = search_in_rounds(search, movable.current, goal, case_numbers)
         from report.document.escape import csv_frame  # slow to import: not before the search
         from report.writers.place_report import write
 
@@ -211,7 +211,7 @@ def _written_scene(
     study: FastenerStudy,
     law: RandomGaps | None,
     source: GapCases,
-    result: Found,
+    result: SearchOutcome,
 ) -> tuple[Scene, LoadCases]:
     """The scene of a file that was written, and its load cases: those that decided, too."""
     scene = read_scene(str(path))

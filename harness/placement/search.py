@@ -17,7 +17,7 @@ less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 1978).
 Exchange moves one fastener to a free hole next to a place where the gap is too large. It tries the fasteners
 nearest to that hole and those whose loss costs least, makes the best move, and goes on while φ falls. It
 starts from the plan of least G among the uniform ones of as many fasteners and the plan after a removal; from
-each of them if FEW fasteners or less are asked for. If there are at most PLANS plans of a number of
+each of them if FEW fasteners or fewer are asked for. If there are at most PLANS plans of a number of
 fasteners, all of them are compared instead.
 """
 
@@ -112,9 +112,9 @@ class Search(PlanSearch):
             return self.best_of_all(step, len(step.plan) - 1), {}
         starts: dict[Plan, Values] = {plan: {} for plan in self.even(len(step.plan) - 1)}
         starts[without(step.plan, self._least(step, earlier, 1)[0])] = earlier
-        ordered = sorted(self.wholes(list(starts), "exchange"), key=Step.order)
+        ordered = sorted(self.wholes(list(starts), "exchange"), key=Step.sort_key)
         tried = [self.exchanged(start, starts[start.plan]) for start in (ordered if every else ordered[:1])]
-        return min(tried, key=Step.order), starts[ordered[0].plan]
+        return min(tried, key=Step.sort_key), starts[ordered[0].plan]
 
     def best_of_all(self, step: Step, count: int) -> Step:
         """The plan of least G among all plans of `count` fasteners. step : the base of the first estimates.
@@ -132,7 +132,7 @@ class Search(PlanSearch):
             values = {plan: value for plan, value in values.items() if value[0] < max(least, self.limit_mm)}
             renewed = self._values(solved[-1], list(values))
             values = {plan: max(pair) for plan, *pair in zip(values, values.values(), renewed, strict=True)}
-        return min(solved, key=Step.order)
+        return min(solved, key=Step.sort_key)
 
     def removal(self, step: Step, earlier: Values) -> Iterator[Step]:
         """Plans with one, two, … fasteners less. earlier : values of earlier steps, renewed."""

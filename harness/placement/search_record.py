@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from harness.placement.candidates import Plan
-from harness.placement.fresh_cases import CONFIDENCE, Found, Goal
+from harness.placement.fresh_cases import CONFIDENCE, Goal, SearchOutcome
 from harness.placement.plan_search import Step
 from harness.placement.session import FastenerStudy
 from harness.results.provenance import stamp
@@ -26,7 +26,7 @@ def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goa
 
 
 def record_of(
-    study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal, result: Found, nodes: Matrix
+    study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal, result: SearchOutcome, nodes: Matrix
 ) -> dict[str, Any]:
     """The content of place.json."""
     scene = study.scene
@@ -47,7 +47,7 @@ def record_of(
         "scene": scene.name,
         "title": scene.title,
         "cases": len(result.numbers),
-        "chosen_by_share": 1 - goal.allowed(len(result.numbers)) / len(result.numbers),
+        "chosen_by_share": 1 - goal.allowed_choosing(len(result.numbers)) / len(result.numbers),
         "preload": study.movable.fastener.preload,
         "stages": [stage.name for stage in scene.stages],
         **asdict(goal),
@@ -68,7 +68,7 @@ def record_of(
     }
 
 
-def sentence_on(result: Found, goal: Goal, nodes: Matrix) -> tuple[str, bool]:
+def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, bool]:
     """The outcome in words, and whether the plan passed."""
     step, which = (result.best, "") if result.best else (result.steps[0], "all of the ")
     sample = result.samples[-1] if result.samples else None

@@ -27,11 +27,11 @@ from harness.results.provenance import installed_version
 from harness.scene.stress import sensitivities
 from harness.series.session import BLOCK, BLOCK_BYTES
 from harness.series.staged import OpenStage, OpenStages, StageCases
+from harness.series.stiffness_session import StiffnessSession
 from harness.solving.call_lock import in_turn
-from harness.verification.assess import Assessment, GapError, assess
+from harness.verification.assess import Assessment, assess
 from harness.verification.judge import LIMIT_MM
-from harness.verification.reference import proof_of
-from problems.build import load_case, prepared
+from problems.build import load_case
 from problems.effects.fasteners import Fasteners
 from problems.forms import Form
 from problems.forms.assembly import DualLoadCase, Matrix, Vector
@@ -39,7 +39,7 @@ from problems.load_cases import LoadCases
 from problems.model.effect import Effect
 from problems.model.scene import JointScene
 from problems.model.stage_answers import Elongations, locked, through
-from solvers.algorithms.newton_sweeps import Case, Sweeps
+from solvers.algorithms.newton_sweeps import Case
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
 ENOUGH_MM = LIMIT_MM / 2  # a bound that needs no further refinement
@@ -49,7 +49,7 @@ POWER = 8  # of the mean of gaps that stands for the largest one where that does
 
 @dataclass(frozen=True)
 class Study(ABC):
-    """What acts in the last stage of a scene but the items of a plan, and its load cases."""
+    """The last stage of a scene without the items of a plan, and its load cases."""
 
     bare: JointScene
     cases: LoadCases
@@ -63,7 +63,7 @@ class Study(ABC):
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What decides the outcome of a plan."""
+        """The facts that decide the outcome of a plan."""
         return {
             "scene_key": self.scene.key,
             "cases_key": self.cases.content_key,
@@ -73,12 +73,12 @@ class Study(ABC):
         }
 
     def bare_stage(self, part: JointScene, plan: Plan) -> tuple[JointScene, Plan]:
-        """What acts in a stage but the items, and the items that do."""
+        """The scene of a stage without items, and the items that act in it."""
         return part, plan
 
     @abstractmethod
     def effect(self, item: Place) -> Effect:
-        """What an item adds to the scene."""
+        """The effect of an item."""
 
     def further(self, answer: "CaseAnswer") -> tuple[float, ...]:
         """More figures of a case."""
@@ -132,20 +132,18 @@ class Outcome:
     plan: Plan = ()
 
 
-class StiffnessSession:
-    """What stages with the same K share; its matrices are made once. scene : one of these stages."""
+class ItemSession(StiffnessSession):
+    """Stages with the same K, and what items and springs change in them. scene : one of these stages."""
 
     def __init__(self, study: Study, scene: JointScene) -> None:
-        self.study, self.scene = study, scene
-        self.data = prepared(scene, form=study.form)
-        self.sweeps = Sweeps(self.data)
-        self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
+        super().__init__(scene, study.form)
+        self.study = study
         self.columns: dict[Place, tuple[Vector, Vector, Vector]] = {}
         self.of_springs: dict[bytes, tuple[Matrix, Matrix]] = {}
 
     @cached_property
     def sensitivities(self) -> list[Vector]:
-        """Of the stresses of superelements; see `harness.scene.stress.sensitivities`."""
+        """The sensitivities of superelement stresses; see `harness.scene.stress.sensitivities`."""
         return sensitivities(self.study.bare, self.proof)
 
     def column(self, item: Place) -> tuple[Vector, Vector, Vector]:
@@ -172,7 +170,7 @@ class StageAnswers:
     estimated; None: these are accurate. locks : whether fasteners have locked what these have reached.
     """
 
-    session: StiffnessSession
+    session: ItemSession
     loads: list[DualLoadCase]
     approaches: Matrix
     tolerance: float
@@ -210,7 +208,7 @@ class CaseAnswer:
     (m,) mm, no less than it can be. x : makes (n,) mm. bound_mm : proven error of x, 0 of an estimate.
     """
 
-    session: StiffnessSession
+    session: ItemSession
     number: int
     approaches: Vector
     load: DualLoadCase
@@ -221,7 +219,7 @@ class CaseAnswer:
 
     @property
     def scene(self) -> JointScene:
-        """What acts in this case but the items, without stages."""
+        """The scene of this case without items and stages."""
         study = self.session.study
         part = locked(study.bare, self.approaches)
         return study.cases.scene_of(self.number, part) or part
@@ -235,9 +233,9 @@ class PlanSession:
     def __init__(self, study: Study) -> None:
         threadpoolctl.threadpool_limits(THREADS)
         self.study, self.cases = study, study.cases
-        self.stages = OpenStages(study.bare, study.form, partial(StiffnessSession, study))
+        self.stages = OpenStages(study.bare, study.form, partial(ItemSession, study))
         self.last, self.scene = self.stages.of(study.bare).session, study.cases.staged(study.scene)
-        self.loads: dict[tuple[OpenStage[StiffnessSession], int], DualLoadCase] = {}
+        self.loads: dict[tuple[OpenStage[ItemSession], int], DualLoadCase] = {}
         self.starts = lru_cache(4)(lambda plan, numbers: self.answers([plan], numbers, ESTIMATE_MM))
         self.block = min(BLOCK, max(BLOCK_BYTES // (8 * self.last.data.assembly.n), 1))
 
@@ -314,7 +312,7 @@ class PlanSession:
 
     def _loads(
         self, part: JointScene, plans: Sequence[Plan], numbers: Sequence[int], approaches: Matrix
-    ) -> tuple[StiffnessSession, list[DualLoadCase]]:
+    ) -> tuple[ItemSession, list[DualLoadCase]]:
         """The load cases in a stage, a scene whose springs have approaches (r, k) mm, and the session."""
         bares, items = zip(*(self.study.bare_stage(part, plan) for plan in plans), strict=True)
         stage = self.stages.of(bares[0])

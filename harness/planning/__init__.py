@@ -1,1 +1,1 @@
-"""From a suite to the list of measurements."""
+"""Suites, their changes and measurements in order; which are still worth making, and in which form."""

@@ -24,7 +24,7 @@ HALF_DECADES = [float(text) for k in range(3, 17) for text in (f"1e-{k}", f"3e-{
 MOST_REPEATS = 5  # of "auto"
 ROUND_REPEATS = 3  # at most, of what is measured in a round
 ROUND = " round="  # before the time, in the keys of a round
-#: After which a trace stops a solver.
+#: Numbers of iterations after which a trace stops a solver.
 ITERATION_LIMITS = [2**k for k in range(20)]
 BEST = 1.0
 QUICK = 0.1  # of the time limit: what the other scenes of a size may take
@@ -33,14 +33,17 @@ LEGIBLE = 120  # characters of a file name
 
 @dataclass(frozen=True)
 class Measurement:
-    """One solver on one scene in one form: the work of one process.
+    """One solver on one scene in one form, perhaps on one load case of a series.
 
     entry : the settings, one of the suite's. scene : the name in the tables; source : a name or an absolute
-    path for `read_scene`. case : the number of the load case in a series. guide : the scene whose rows decide
-    whether a library's form is measured on this one, how many times as long as its best it may take there,
-    and how many seconds (tolerance_search.py); None if all forms are. round : when a round began, in which an
-    entry with `beside` is measured again; beside_round : the round beside which this one is measured.
-    iteration_limit : in a trace, after which the solver stops.
+    path for `read_scene`. case : the number of the load case in a series.
+
+    guide : (scene, times, seconds): the form is measured only if on that scene it took at most `times` as
+    long as the library's best form, and that one at most `seconds`, as far as rows of it are
+    there (tolerance_search.py); None: all forms are.
+
+    round : when a round began, in which an entry with `beside` is measured again; beside_round : the round
+    beside which this one is measured. iteration_limit : in a trace, after which the solver stops.
     """
 
     suite: Suite
@@ -150,9 +153,10 @@ def expand(suite: Suite) -> list[Measurement]:
 
 
 def _guides(suite: Suite, scenes: Sequence[Scene]) -> dict[str, tuple[str, float, float] | None]:
-    """The guide of each scene in a suite with `times_best_form`: of the first of a size, the first of the
-    next smaller size; of each other one, the first of its size, where the form must have been the best, and
-    quick.
+    """The guide of each scene in a suite with `times_best_form`.
+
+    The first scene of a size is guided by the first of the next smaller size; any other scene by the first of
+    its size, where the form must have been the best, and quick.
     """
     sizes = {scene.name: (scene.expected_size or (0, 0))[0] for scene in scenes}
     first = {sizes[scene.name]: scene.name for scene in reversed(scenes)}

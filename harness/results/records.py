@@ -24,7 +24,7 @@ from .schema import SERIES
 Row = dict[str, Any]
 
 MEASUREMENTS, PLANS, SHIMS, TOLERANCE = "measurements.jsonl", "plans.jsonl", "shims.jsonl", "tolerance.json"
-#: The files with which the commands go on; a directory has one of them.
+#: The file by which each command continues an interrupted run; a directory has one of them at most.
 JOURNALS = (MEASUREMENTS, SERIES, PLANS, SHIMS, TOLERANCE)
 OUTDATED = "measurements.outdated.jsonl"
 ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read
@@ -186,24 +186,24 @@ def refuse_other(path: Path, recorded: Row, identity: Row) -> None:
         raise InputError(faults)
 
 
-def refuse_other_command(directory: Path, own: str, outputs: Sequence[str] = ()) -> None:
+def refuse_other_command(directory: Path, journal: str, outputs: Sequence[str] = ()) -> None:
     """Raise InputError if the directory has the journal of another command than the one whose journal is
-    `own`, or some of the outputs without it.
+    `journal`, or some of the outputs without it.
     """
-    names = (*JOURNALS, *(() if (directory / own).exists() else outputs))
-    if there := [name for name in names if name != own and (directory / name).exists()]:
+    names = (*JOURNALS, *(() if (directory / journal).exists() else outputs))
+    if there := [name for name in names if name != journal and (directory / name).exists()]:
         allowed = f"has {there[0]} of another command: name another directory"
         raise InputError.one("--out", "directory", str(directory), allowed)
 
 
 @contextmanager
 def locked(
-    directory: Path, own: str = MEASUREMENTS, folders: Sequence[str] = (), outputs: Sequence[str] = ()
+    directory: Path, journal: str = MEASUREMENTS, folders: Sequence[str] = (), outputs: Sequence[str] = ()
 ) -> Iterator[None]:
     """Create the directory and lock it against a second run. Raises InputError if that fails, or as
     `refuse_other_command`.
     """
-    refuse_other_command(directory, own, outputs)
+    refuse_other_command(directory, journal, outputs)
     try:
         for folder in ("", *folders):
             (directory / folder).mkdir(parents=True, exist_ok=True)

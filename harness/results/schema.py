@@ -208,6 +208,6 @@ MEASURED = tuple(kinds(Report))
 BUILDING = {"K": ("condensation", "ties"), "factors": ("cholesky",), "Q": ("Q",)}
 
 
-def of_kind(kind: Kind) -> list[str]:
+def fields_of_kind(kind: Kind) -> list[str]:
     """The names of the fields of a kind."""
     return [name for name, of in FIELDS.items() if of == kind]

@@ -175,7 +175,7 @@ def rows(directory: Path) -> Iterator[Row]:
 
 
 def write_contacts(directory: Path, arrays: Mapping[str, Any]) -> None:
-    """m, contact_nodes (m, 2) if they are known, and fasteners (k, 2), mm, for the figures."""
+    """Write m, contact_nodes (m, 2) if they are known, and fasteners (k, 2), mm, for the figures."""
     content = io.BytesIO()
     np.savez(content, **arrays)
     write_fact(directory, "contacts", content.getvalue())

@@ -27,7 +27,7 @@ from harness.results.provenance import fingerprints
 from harness.results.records import replace_text
 from harness.terminal.console import console_of
 from harness.verification.judge import LIMIT_MM
-from harness.verification.reference_problem import measurable, opened
+from harness.verification.reference_problem import measurable, open_problem
 from problems import formats
 from problems.errors import InputError
 from problems.forms import FORMS, Form
@@ -43,8 +43,8 @@ from report.document.numbers import counted
 from .solution import Source, load_scene
 
 Arrays = dict[str, Any]
-#: The columns of a test set, https://github.com/qpsolvers/qpbenchmark; matrices are dense, row by row.
 AT_ONCE = 2**20  # lines of a text
+#: The columns of a test set, https://github.com/qpsolvers/qpbenchmark; matrices are dense, row by row.
 TEST_SET = ("P", "q", "G", "h", "A", "b", "lb", "ub", "name")
 
 
@@ -113,7 +113,7 @@ def export(
     read = load_scene(scene)
     refuse_unwritable(out, read.sources)
     if format is not None:
-        problem = opened(read, chosen_form(read, FORMS, None).form)
+        problem = open_problem(read, chosen_form(read, FORMS, None).form)
         data = matrices(problem.prepared, problem.load)
         with atomic_output(out, read.sources) as new:
             formats.FORMATS[format].write(new, data)
@@ -150,7 +150,7 @@ def _program(scene: Scene, form: Form, with_reference: bool, limit_s: float | No
     does not fit into the memory of this machine.
     """
     chosen_form(scene, FORMS, form)
-    judged = measurable(scene, limit_s=limit_s, form=form) if with_reference else opened(scene, form)
+    judged = measurable(scene, limit_s=limit_s, form=form) if with_reference else open_problem(scene, form)
     problem = in_form(judged.prepared, form)
     (load,) = problem.loads([judged.load])
     blocks = problem.blocks

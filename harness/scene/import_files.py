@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from harness.planning.form_choice import chosen_form
 from harness.results.atomic_output import atomic_output
 from harness.terminal.console import console_of
-from harness.verification.reference_problem import ReferenceProblem, opened
+from harness.verification.reference_problem import ReferenceProblem, open_problem
 from problems import formats
 from problems.errors import Fault, InputError
 from problems.forms import FORMS
@@ -143,7 +143,7 @@ def _opened(path: Path, origin: dict[str, Path]) -> ReferenceProblem:
     """The problem in its cheaper form. Raises InputError, naming K's own file, if K is indefinite."""
     try:
         scene = read_scene(str(path))
-        problem = opened(scene, chosen_form(scene, FORMS, None).form)
+        problem = open_problem(scene, chosen_form(scene, FORMS, None).form)
         problem.prepared.assembly.K.ensure_factored()
         return problem
     except InputError as error:

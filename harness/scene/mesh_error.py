@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from harness.scene.solution import Solution
-from harness.solving.session import candidates
+from harness.solving.solver_session import candidate_forces
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -54,8 +54,8 @@ def estimated(
 
     None for given matrices and superelements, whose mesh is not known; without contacts or a coarser mesh;
     and where another mesh has no answer. refine : solve on a finer mesh too, with four times the unknowns. r
-    is the smaller one of the two sides of the junction, but above 1. largest_stress : of an answer û to a
-    scene without stages.
+    is the smaller of the ratios of the distances between lines, along x and along y, that are above 1.
+    largest_stress : of an answer û to a scene without stages.
     """
     scene = solution.problem.scene
     joint = scene.joint if isinstance(scene, JointScene) else None
@@ -123,7 +123,7 @@ def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector
         one = locked(replace(part, effects=tuple(rest)), approaches[:, 0])
         data = prepared(one, form="sparse")
         load = LoadCase(load_case(one, "sparse").f, _at(here, junction_load(gaps, here)[1], joint.nodes))
-        _, lam = next(candidates(data, load), ("", None))
+        _, lam = next(candidate_forces(data, load), ("", None))
         if lam is None:
             raise InputError.one(other.name, "mesh", list(joint.junction.nodes), "one with an answer")
         A = data.assembly.A

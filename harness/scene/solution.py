@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from harness.planning.form_choice import Choice, chosen_form
-from harness.solving.session import answer_of, form_of
+from harness.solving.solver_session import answer_of, form_of
 from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, open_stage

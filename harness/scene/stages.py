@@ -1,4 +1,4 @@
-"""What a stage of a scene has reached."""
+"""The answer at the end of a stage."""
 
 from dataclasses import dataclass, replace
 
@@ -13,7 +13,7 @@ from problems.model.scene import JointScene
 
 @dataclass(frozen=True)
 class StageAnswer:
-    """What a stage has reached.
+    """The answer at the end of a stage.
 
     Parameters
     ----------

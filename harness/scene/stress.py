@@ -125,20 +125,25 @@ def refuse_unusable(allowed: float | None, scene: Scene) -> None:
     _ = [part.recovery for part, _ in _superelements(scene)]
 
 
-def largest_of(scene: JointScene, x: Vector, energy: float = 0.0, of_points: Sequence[Vector] = ()) -> float:
+def largest_of(
+    scene: JointScene, x: Vector, energy: float = 0.0, point_sensitivities: Sequence[Vector] = ()
+) -> float:
     """The largest von Mises stress away from forces at points, N/mm², no less than it can be.
 
-    x : as in `stresses_of`, ± energy, ‖x − x*‖_K. of_points : see `sensitivities`.
+    x : as in `stresses_of`, ± energy, ‖x − x*‖_K. point_sensitivities : see `sensitivities`.
     """
     parts, largest = stresses_of(scene, x), 0.0
-    for part, error in zip(parts, of_points or [part.sensitivity for part in parts], strict=True):
+    for part, error in zip(parts, point_sensitivities or [part.sensitivity for part in parts], strict=True):
         upper = part.von_mises + (energy * error if energy else 0.0)  # an error may be infinite
         largest = max(largest, float(upper[~part.near_force].max(initial=0.0)))
     return largest
 
 
 def sensitivities(scene: Scene, proof: Proof) -> list[Vector]:
-    """(k,) that of the points of each superelement; none of plates, which have theirs with their stresses."""
+    """The sensitivities (k,) at the points of each superelement.
+
+    An empty list for plates, whose stresses have them.
+    """
     return [_sensitivity(part.recovery.S, at, proof) for part, at in _superelements(scene)]
 
 
@@ -172,8 +177,8 @@ def stresses(solution: Solution) -> Stresses:
     parts = stresses_of(problem.scene, solution.unknowns)
     proof = proof_of(problem.prepared)
     energy = proof.energy_error(problem.load, reference.x, reference.lam)
-    of_points = sensitivities(problem.scene, proof) or [part.sensitivity for part in parts]
-    errors = [energy * one for one in of_points]
+    point_sensitivities = sensitivities(problem.scene, proof) or [part.sensitivity for part in parts]
+    errors = [energy * one for one in point_sensitivities]
     if not solution.from_reference:
         exact = stresses_of(problem.scene, reference.x)
         for part, other, error in zip(parts, exact, errors, strict=True):
@@ -205,7 +210,10 @@ def _superelements(scene: Scene) -> list[tuple[Any, slice]]:
 
 
 def _sensitivity(S: sp.csr_array, at: slice, proof: Proof) -> Vector:
-    """(k,) that of the points of a recovery matrix S (3k, n) of the unknowns `at`; see PartStress."""
+    """The sensitivities (k,) of the points of a recovery matrix S (3k, n) of the unknowns `at`.
+
+    See PartStress.
+    """
     units, norms = proof.balanced, np.zeros(S.shape[0])
     for start in range(0, len(norms), ROWS):
         rows = slice(start, start + ROWS)
@@ -215,7 +223,7 @@ def _sensitivity(S: sp.csr_array, at: slice, proof: Proof) -> Vector:
         z = units.solve(s)
         r = length(s - units.D * units.assembly.K.multiply(units.D * z))
         r += gamma(len(s) + 2) * (length(s) + units.stiffest * length(z))
-        norms[rows] = units.energy(z) + SAFE * r / np.sqrt(proof.kappa)
+        norms[rows] = units.energy_norm(z) + SAFE * r / np.sqrt(proof.kappa)
     xx, yy, xy = norms.reshape(-1, 3).T
     return np.asarray(SAFE * np.sqrt(1.5 * (xx**2 + yy**2) + 3 * xy**2))
 

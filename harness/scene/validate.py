@@ -12,7 +12,7 @@ from harness.terminal.console import console_of
 from harness.terminal.docstrings import docstring
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
-from harness.verification.rounded_stiffness import about, expected_error
+from harness.verification.rounded_stiffness import estimated_displacements, expected_error
 from problems.build import prepared, same_stiffness
 from problems.errors import InputError
 from problems.forms import FORMS
@@ -200,7 +200,7 @@ def digits_sentence(problem: ReferenceProblem, solved: bool) -> tuple[str, bool]
     if solved:
         x, lam = problem.reference.x, problem.reference.lam
     else:
-        x, lam = about(data, problem.load), np.zeros(data.assembly.m)
+        x, lam = estimated_displacements(data, problem.load), np.zeros(data.assembly.m)
     error = expected_error(data, x, lam, digits)
     text = f"The entries of K seem to have {digits} digits: if they were rounded, displacements are off by"
     few = error > LIMIT_MM

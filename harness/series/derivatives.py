@@ -24,10 +24,11 @@ ROUNDING = 1e-12  # of the largest: a smaller rate is 0
 
 
 def derivatives(job: Job) -> dict[str, list[Any]]:
-    """Of each input its name and mean, the derivative, mm per unit and per standard deviation, not a number
-    where it changes K, and the values between which it holds.
+    """The derivative of the largest gap by each input, at the means.
 
-    The elements of an input with `each` move together; the field of the gap is at its mean.
+    Columns: name, mean, derivative in mm per unit and per standard deviation (NaN if the input changes K),
+    and the values between which it holds. The elements of an input with `each` move together; the field of
+    the gap is at its mean.
     """
     assert isinstance(job.cases, RandomInputs)
     laws = [one.law for one in job.cases.inputs]

@@ -93,7 +93,7 @@ def solve_isolated(
 
 
 def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
-    """The same, in the process of its own."""
+    """Solve the cases of a task in the child process; each result is an event."""
     job, numbers, batched = task
 
     def report(**event: Any) -> None:

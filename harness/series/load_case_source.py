@@ -32,7 +32,7 @@ OF_FIELD = {
 
 @dataclass(frozen=True)
 class GapCases:
-    """Load cases that differ in their initial gaps, random or measured.
+    """Load cases that differ in their gaps (random, measured or of scans) or in random keys of the scene.
 
     Parameters
     ----------
@@ -110,8 +110,11 @@ class GapCases:
             faults.append(Fault("cases", "given", " ".join(chain(*sources)), allowed))
         return faults
 
-    def are_one(self, scene: JointScene) -> bool:
-        """Whether a search on this scene has one case, the scene itself: nothing of it is random."""
+    def is_single(self, scene: JointScene) -> bool:
+        """Whether a search has one case, the scene itself.
+
+        No option but `options` is given, and nothing of the scene is random.
+        """
         random = scene.random or any(gap.random for gap in scene.effects_of(InitialGap))
         return replace(self, options=AS_NAMED) == DEFAULT and not random
 
@@ -120,7 +123,9 @@ class GapCases:
         if self.contributors is not None:
             allowed = "left out: the cases of contributors are not independent"
             raise InputError.one("--contributors", "base points", self.contributors, allowed)
-        return Listed((load_case(last_scene(scene), form),)) if self.are_one(scene) else self.of(scene, form)
+        if self.is_single(scene):
+            return Listed((load_case(last_scene(scene), form),))
+        return self.of(scene, form)
 
     def laws(self, scene: Scene) -> tuple[str, ...]:
         """`random`, and the entries of a scene's [random] for other keys; measured gaps leave these out."""

@@ -120,7 +120,7 @@ def metadata(job: Job) -> dict[str, Any]:
 
 
 def record_contacts(job: Job, directory: Path) -> None:
-    """The positions of contacts and fasteners, for the figures."""
+    """Record the places of the contacts, and the marks of effects as `fasteners`, for the figures."""
     scene = last_scene(job.scene)
     assembly = prepared(scene, form=job.form).assembly
     arrays = {"m": np.array(assembly.m)}

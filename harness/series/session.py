@@ -16,7 +16,7 @@ import threadpoolctl
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.results.series_file import Gaps
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import best_of_candidates, proof_of
@@ -39,7 +39,7 @@ BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases
 KEPT_ANSWERS = 32  # for warm starts: memory does not grow with the number of cases
 
 
-Report = Callable[..., None]
+ReportEvent = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class SeriesOptions:
     Parameters
     ----------
     solver : str
-        Name of a solver, or of the plug-in's.
+        Name of a solver, or of the one in the plug-in.
     form : str, optional
         "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
     tolerance : float
@@ -121,11 +121,11 @@ class SeriesSession(Reporter):
     """
 
     def __init__(
-        self, job: Job, solver: Solver | None = None, report: Report | None = None, batched: bool = True
+        self, job: Job, solver: Solver | None = None, report: ReportEvent | None = None, batched: bool = True
     ) -> None:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
-        self.report: Report = report or (lambda **event: None)
+        self.report: ReportEvent = report or (lambda **event: None)
         self.block_time_s = 0.0 if report else BLOCK_TIME_S
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)

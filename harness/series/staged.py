@@ -6,7 +6,7 @@ s have locked in this case. If effects are random, the cases say what acts in s.
 its factors and the state of the solver.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Generic, TypeVar
@@ -75,8 +75,10 @@ class StageCases(LoadCases):
 
 @dataclass(frozen=True, eq=False)
 class OpenStage(Generic[S]):
-    """What the load cases of a stage share: its scene without approaches, the session of its K, f (n,) N, the
-    change of the gap from the last stage (m,) mm, and its springs.
+    """A stage as its load cases share it.
+
+    scene : without approaches. session : of its K. f : (n,) N. gap_change : from the last stage, (m,) mm.
+    springs : those of the stage.
     """
 
     scene: JointScene
@@ -88,6 +90,17 @@ class OpenStage(Generic[S]):
     def locking(self, assembly: Assembly, approaches: Matrix) -> Matrix:
         """T(k a) (n, cases) N, the forces of approaches (r, cases) mm."""
         return assembly.from_junction(self.springs.T @ (self.springs.k[:, None] * approaches))
+
+
+def shared_session(
+    scene: JointScene, opened: Iterable[tuple[JointScene, S]], make: Callable[[JointScene], S]
+) -> S:
+    """The session of a stage: that of one with the same K, or else a new one.
+
+    opened : the scenes of stages, each with its session. make : makes the session of a scene.
+    """
+    shared = (session for other, session in opened if adopts_model(scene, other))
+    return next(shared, None) or make(scene)
 
 
 class OpenStages(Generic[S]):
@@ -105,8 +118,8 @@ class OpenStages(Generic[S]):
         if (key := (part.key, part.origin)) not in self.stages:
             springs = Springs.of(part)
             bare = locked(part, np.zeros(len(springs.k)))
-            shared = (one.session for one in self.stages.values() if adopts_model(bare, one.scene))
-            session, load = next(shared, None) or self.make(bare), load_case(bare, self.form)
+            opened = ((one.scene, one.session) for one in self.stages.values())
+            session, load = shared_session(bare, opened, self.make), load_case(bare, self.form)
             self.stages[key] = OpenStage(bare, session, load.f, load.g - self.gap, springs)
         return self.stages[key]
 

@@ -16,7 +16,7 @@ import numpy as np
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.model.interface import AnyJoint
 
-from .patches import USUAL, Patch, corners_of, made
+from .patches import USUAL, Patch, checked_patches, corners_of
 
 DIGITS = 6  # of mm: closer lines of contacts are one
 
@@ -34,7 +34,7 @@ def patches_of_gap(joint: AnyJoint, gap: Vector, limit_mm: float) -> tuple[Patch
             regions[widest : widest + 1] = _divided(places, y, limit_mm, regions[widest])
         outlines = sorted(corners_of(*_borders(joint.bounds, places, places[some])) for some in regions)
         shapes = [(str(k), outline, "") for k, outline in enumerate(outlines, start=len(patches) + 1)]
-        patches += made(joint, shapes, [pair])
+        patches += checked_patches(joint, shapes, [pair])
     return tuple(patches)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.placement.fresh_cases import Found, Goal
+from harness.placement.fresh_cases import Goal, SearchOutcome
 from harness.placement.session import Outcome
 from harness.scene.allowed_gap import check_answer
 from harness.scene.mesh_error import estimated, mesh_record
@@ -23,7 +23,7 @@ from .study import ShimStudy
 UNITS = ("N", "N/mm²")  # of the limits of force and stress
 
 
-def sentence_of(result: Found, goal: Goal, study: ShimStudy) -> tuple[str, bool]:
+def sentence_of(result: SearchOutcome, goal: Goal, study: ShimStudy) -> tuple[str, bool]:
     """The outcome in words, and whether the plan passed."""
     step, sample = result.best, result.samples[-1] if result.samples else None
     least = step or min(result.steps, key=lambda step: step.gap_mm)
@@ -43,9 +43,7 @@ def sentence_of(result: Found, goal: Goal, study: ShimStudy) -> tuple[str, bool]
 
 
 def figures_of(study: ShimStudy, before: Sequence[Outcome], after: Sequence[Outcome]) -> dict[str, Any]:
-    """Of each patch, and of all, the largest figures in some cases without shims and in some with them; of a
-    volume the mean.
-    """
+    """The figures of each patch and of all, without and with shims: the largest, of a volume the mean."""
     count, joint = len(study.patches), study.bare.joint
     old, new = (np.array([row for one in some for row in one.further]) for some in (before, after))
     patches = [
@@ -66,7 +64,7 @@ def figures_of(study: ShimStudy, before: Sequence[Outcome], after: Sequence[Outc
     return {"patches": patches, **whole, **drawn, "worst_at": position(study.places[worst], study.places)}
 
 
-def record_of(result: Found, study: ShimStudy) -> dict[str, Any]:
+def record_of(result: SearchOutcome, study: ShimStudy) -> dict[str, Any]:
     """The figures before, in the cases that chose, and after, in those that decided, and what was tried."""
     best = result.best or result.steps[0]
     after = result.samples[-1].step if result.samples else best
@@ -80,8 +78,11 @@ def record_of(result: Found, study: ShimStudy) -> dict[str, Any]:
     return figures | {"samples": samples, "steps": steps}
 
 
-def as_solved(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:
-    """What `solve` says of the scene with shims, and the forces in its fasteners without and with them."""
+def solver_statements(path: Path, shims: int, allowed_mm: float) -> dict[str, Any]:
+    """The uncertainties that `solve` states for the scene with shims, and the forces in its fasteners.
+
+    The forces are those without and with shims.
+    """
     after: Any = read_scene(str(path))
     without = replace(after, effects=after.effects[: len(after.effects) - shims])
     answers = [solve(without), solve(after)]

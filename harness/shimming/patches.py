@@ -27,7 +27,10 @@ STOCK = "thicknesses above 0 mm in ascending order, as 0.2,0.3,0.5, or FIRST:LAS
 
 @dataclass(frozen=True)
 class Patch:
-    """outline : the corners of the shim as it is cut, mm. shim : the effect, 1 mm thick."""
+    """An area that a shim may fill.
+
+    outline : the corners of the shim as cut, mm. shim : the effect, 1 mm thick.
+    """
 
     name: str
     outline: tuple[Place, ...]
@@ -73,7 +76,7 @@ def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
         x, y = (np.linspace(low, high, n + 1) for (low, high), n in zip(joint.bounds.T, counts, strict=True))
         cells = product(pairwise(y.tolist()), pairwise(x.tolist()))
         shapes = [(str(k), corners_of(*across, *up), "") for k, (up, across) in enumerate(cells, start=1)]
-        return made(joint, shapes, joint.pairs)
+        return checked_patches(joint, shapes, joint.pairs)
     cut = not Cells.of(Path(source), CSV_MIB, BORDERS).header
     table, shapes = read_columns(Path(source), CORNERS if cut else BORDERS), []
     names = table.words["name"] or [str(k + 1) for k in range(len(table.rows))]
@@ -83,7 +86,7 @@ def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
         shapes.append((name, corners if cut else corners_of(*corners[0]), f"line {line}"))
     if table.faults:
         raise InputError(table.faults)
-    return made(joint, shapes, joint.pairs, source)
+    return checked_patches(joint, shapes, joint.pairs, source)
 
 
 def corners_of(west: float, east: float, south: float, north: float) -> tuple[Place, ...]:
@@ -92,7 +95,7 @@ def corners_of(west: float, east: float, south: float, north: float) -> tuple[Pl
     return corners if west < east and south < north else corners[::2]
 
 
-def made(
+def checked_patches(
     joint: AnyJoint, shapes: Sequence[Shape], pairs: Iterable[Pair], source: str = "--patches"
 ) -> tuple[Patch, ...]:
     """A patch for each shape in each pair. Raises InputError if an outline is none, off the junction, without

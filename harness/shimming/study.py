@@ -42,7 +42,7 @@ class ShimStudy(Study):
 
     @cached_property
     def places(self) -> Matrix:
-        """(m, 2) of the contacts, mm."""
+        """The places (m, 2) of the contacts, mm."""
         return np.concatenate([self.bare.joint.places(pair) for pair in self.bare.joint.pairs])
 
     @cached_property
@@ -69,13 +69,15 @@ class ShimStudy(Study):
 
     @cached_property
     def areas(self) -> Vector:
-        """(m,) of the contacts, mm²."""
+        """The tributary areas (m,) of the contacts, mm²."""
         joint = self.bare.joint
         return np.concatenate([surface_of(joint.places(pair)).areas for pair in joint.pairs])
 
     def further(self, answer: CaseAnswer) -> tuple[float, ...]:
-        """In each patch and beyond them the largest gap, mm, and ∫ gap, mm³; the largest gap of each of
-        `halves`; force, N, and stress, N/mm², if they have a limit, no less than they can be.
+        """The figures of a case, no less than they can be.
+
+        The largest gap, mm, and ∫ gap, mm³, in each patch and beyond all; the largest gap of each of
+        `halves`; force, N, and stress, N/mm², if they have a limit.
         """
         gap, session, force, stress = answer.gap, answer.session, 0.0, 0.0
         gaps, halves = (

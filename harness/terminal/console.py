@@ -223,12 +223,12 @@ class Display(Reporter):
     def finished(self, row: Row) -> None:
         """Print the row of a measurement that is done."""
         self.console.print(row_text(row), soft_wrap=True)
-        self.passed_over(1)
+        self.advance(1)
 
     def added(self, count: int) -> None:
         """Note that so many more measurements are made."""
         self.bar.update(self.task, total=(self.bar.tasks[self.task].total or 0) + count)
 
-    def passed_over(self, count: int) -> None:
-        """Note that so many measurements need not be made any more."""
+    def advance(self, count: int) -> None:
+        """Advance the bar by so many measurements, made or no longer needed."""
         self.bar.update(self.task, advance=count)

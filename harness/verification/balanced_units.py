@@ -93,7 +93,7 @@ class Balanced:
         D = self.D[:, 0]
         return SAFE * float((self.assembly.K.absolute_sums(D) * D).max(initial=0.0))
 
-    def energy(self, z: Matrix) -> Vector:
+    def energy_norm(self, z: Matrix) -> Vector:
         """‖z‖_K' (k,) or more, for z (n, k).
 
         |fl(zᵀK'z) − zᵀK'z| ≤ γ_2n |z|ᵀ|K'||z| ≤ γ_2n ‖K'‖_∞ ‖z‖².

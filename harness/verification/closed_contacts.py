@@ -16,7 +16,7 @@ MAX_SETS = 10  # contact sets tried with M for one load case
 
 @dataclass(frozen=True)
 class ScaledInverse:
-    """M ≈ Q⁻¹, None if it cannot be made, and about the diagonal of Q (m,), in units R (m,) of contacts.
+    """M ≈ Q⁻¹, None if it cannot be made, and estimates of the diagonal of Q (m,), in units R (m,).
 
     Q : (m, m) where sets are solved with it.
     """

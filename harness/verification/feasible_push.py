@@ -22,7 +22,7 @@ from problems.stiffness import gamma
 
 from .balanced_units import Balanced
 from .enclosure import ETA, SAFE
-from .sprung_contacts import Springs
+from .sprung_contacts import SprungFactors
 
 NEARLY_CLOSED = 2.0**20  # times the largest overlap: a larger gap stays open
 LONGEST, ENOUGH = 5.0, 0.1  # of a_jᵀp in a step, and at the end
@@ -35,10 +35,10 @@ class Push:
 
     opening: Vector
     error: Vector
-    energy: float
+    energy_norm: float
 
     @classmethod
-    def of(cls, units: Balanced, springs: Springs, closed: Mask) -> "Push":
+    def of(cls, units: Balanced, springs: SprungFactors, closed: Mask) -> "Push":
         """The push that opens the contacts `closed` (m,)."""
         sprung, A = springs.sprung, springs.sprung.A
         p, opening = np.zeros(A.shape[0]), np.zeros(A.shape[1])
@@ -53,7 +53,7 @@ class Push:
             p, opening = p + share * step, opening + share * change
         roundings = np.diff(units.At.indptr)
         error = SAFE * (gamma(roundings) * (abs(units.At) @ abs(p)) + roundings * ETA)
-        return cls(units.At @ p, error, float(units.energy(p[:, None])[0]))
+        return cls(units.At @ p, error, float(units.energy_norm(p[:, None])[0]))
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def distance(self, s: Vector, error: Vector, lam: Vector) -> float:
@@ -65,7 +65,7 @@ class Push:
         if closing.any() or not (opening[overlap] > 0).all():
             return np.inf
         gap = float(lam @ (abs(s) + error + theta * (abs(self.opening) + self.error)))
-        return float(SAFE * np.sqrt((theta * self.energy) ** 2 + 2 * SAFE * gap + len(s) * ETA))
+        return float(SAFE * np.sqrt((theta * self.energy_norm) ** 2 + 2 * SAFE * gap + len(s) * ETA))
 
 
 def nearly_closed(s: Vector, error: Vector, lam: Vector) -> Mask:

@@ -18,8 +18,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.results.comparison import Side, floor_mm, measurement, read_side, refuse_incomparable
+from harness.results.counted_rows import counting
 from harness.results.records import Row, replace_text, to_line
-from harness.results.searches import counting
 from harness.terminal.console import legible
 
 from .judge import Judgement
@@ -32,7 +32,9 @@ MARGIN = 10.0  # by which an error may exceed the baseline's
 
 @dataclass(frozen=True)
 class Finding:
-    """One gated measurement, judged again. why : the reason if it failed. baseline_mm : its error there.
+    """One gated measurement, judged again.
+
+    why : the reason if it failed. baseline_mm : its error in the baseline.
     slowdown : S of slowdown.py if that is why. untimed : whether its time was to be compared and cannot be.
     """
 

@@ -18,9 +18,9 @@ from harness.planning.suite import RandomCases
 from harness.results import records
 from harness.results.answer_files import is_kept
 from harness.results.atomic_output import refuse_outputs
+from harness.results.counted_rows import counting
 from harness.results.records import Row
 from harness.results.row_validation import MEASUREMENT, refuse_wrong_kinds
-from harness.results.searches import counting
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from problems.errors import InputError
@@ -62,7 +62,8 @@ class GateOutcome:
     findings : list of Finding
         One per gated row: its key, its judgement, its limit_mm, and why it has not passed.
     code : int
-        Exit code of the command: 0 passed, 1 accuracy lost, 3 nothing could be judged or a time not compared.
+        Exit code of the command: 0 passed, 1 accuracy lost or slower, 3 nothing judged or a time not
+        compared.
     sentences : tuple of str
         The outcome in words.
     """
@@ -73,7 +74,7 @@ class GateOutcome:
 
     @property
     def passed(self) -> bool:
-        """Whether every gated row is accurate enough."""
+        """Whether every gated row is accurate enough and, if asked, none slower than allowed."""
         return self.code == DONE
 
 

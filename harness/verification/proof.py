@@ -44,7 +44,7 @@ from .balanced_units import Balanced
 from .closed_contacts import ClosedContacts, ScaledInverse
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
 from .feasible_push import Push, nearly_closed
-from .sprung_contacts import Springs, SprungContacts
+from .sprung_contacts import SprungContacts, SprungFactors
 
 MAX_PASSES = 30
 MAX_WORSE = 3  # passes in a row that do not halve the bound of the last: contact sets may still change
@@ -94,7 +94,7 @@ class Proof:
         return ScaledInverse.of(self.balanced.prepared, self.balanced.R[:, 0])
 
     @cached_property
-    def springs(self) -> Springs | None:
+    def springs(self) -> SprungFactors | None:
         """K with springs, where K is sparse and there is neither M nor Q, or it is dense and small and the
         contacts are almost dependent.
         """
@@ -102,7 +102,7 @@ class Proof:
         sprung = inverse.M is None and inverse.Q is None
         if assembly.K.dense:
             sprung = assembly.n <= FEW and self.balanced.sigma2 == 0
-        return Springs(self.balanced, self.kappa) if sprung else None
+        return SprungFactors(self.balanced, self.kappa) if sprung else None
 
     @property
     def pushes(self) -> bool:
@@ -196,17 +196,17 @@ class Proof:
         z, distance = np.zeros_like(x.lo), np.zeros(x.hi.shape[1])
         if sharpness is Sharpness.TRANSLATED:
             s, z = self._translated(s, lam.hi > 0)
-            distance = units.energy(z) / 2
+            distance = units.energy_norm(z) / 2
         D, away = at_junction(units.D), at_junction(abs(x.lo) + abs(z) / 2)
         reach = D / np.sqrt(self.kappa)
         if sharpness is not Sharpness.PLAIN:
             reach = np.minimum(reach, np.sqrt(self.compliance))
-        error, rounding = self._energies(lam, r, s, distance)
+        error, rounding = self._energy_norms(lam, r, s, distance)
         bounds = SAFE * (reach * error + D * away).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
         valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
         return np.where(valid, bounds, np.inf), (reach * rounding + D * away).max(axis=0, initial=0.0)
 
-    def _energies(
+    def _energy_norms(
         self, lam: DoubleDouble, r: Enclosure, s: Enclosure, distance: Vector
     ) -> tuple[Vector, Vector]:
         """‖x − x*‖_K (k,) or more, √(N·mm), of r, s and a distance (k,); its part from roundings."""
@@ -231,11 +231,11 @@ class Proof:
         x, lam = x[:, None] / units.D, np.maximum(lam, 0.0)[:, None] / units.R
         x2, lam2 = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
         r, s = units.residuals(units.load([load]), x2, lam2)
-        error = float(self._energies(lam2, r, s, np.zeros(1))[0][0])
+        error = float(self._energy_norms(lam2, r, s, np.zeros(1))[0][0])
         return error if np.isfinite(error) else np.inf
 
     def _pushed(self, s: Vector, error: Vector, uncertain: Vector, lam: Vector) -> tuple[float, float]:
-        """‖x − x*‖_K or less, and its part that is due to the errors of s; all (m,)."""
+        """‖x − x*‖_K or more, √(N·mm), and its part due to the errors of s. All arguments are (m,)."""
         assert self.springs is not None
         push = Push.of(self.balanced, self.springs, nearly_closed(s, error, lam))
         return push.distance(s, error, lam), push.distance(np.where(uncertain > 0, 0, s), uncertain, lam)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.solving.session import candidates
+from harness.solving.solver_session import candidate_forces
 from problems import storage
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
@@ -87,7 +87,7 @@ def best_of_candidates(
     proof, end = proof_of(prepared), time.monotonic() + limit_s
     best: Proven | None = None
     route = stopped = ""
-    for name, lam in chain(first, candidates(prepared, load)):
+    for name, lam in chain(first, candidate_forces(prepared, load)):
         (refined,) = proof.proven([load], [lam])
         if best is None or refined.bound_mm < best.bound_mm:
             best, route = refined, name

@@ -37,8 +37,8 @@ class ReferenceProblem:
 
     limit_s : after it no further candidate for the reference is tried. case : the number of the load case in
     a series; None for the scene's own. first : candidates that are tried before the in-house methods.
-    locks_proven : whether the answers of earlier stages, in which fasteners lock, are proven; if not, this one
-    is not, either.
+    locks_proven : whether the answers of earlier stages, in which fasteners lock, are proven; if not, nor is
+    the reference.
     """
 
     scene: Scene
@@ -95,7 +95,7 @@ class ReferenceProblem:
         return replace(self, load=load, case=case, first=[])
 
     def judged(self, x: Vector, lam: Vector, limit_mm: float) -> Judgement:
-        """x of all unknowns of the form, mm; lam (m,) N, NaN if there are none."""
+        """The judgement of x (all unknowns of the form, mm) and lam (m,) N, NaN if there are none."""
         return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
@@ -110,10 +110,10 @@ class ReferenceProblem:
         return self.judged(x, lam, limit_mm)
 
 
-def opened(
+def open_problem(
     scene: Scene, form: Form = "dual", reporter: Reporter = SILENT, limit_s: float | None = None
 ) -> ReferenceProblem:
-    """Open or build a scene, of one with stages the last; see `open_stage`. Raises InputError."""
+    """Open or build the problem of a scene, or of its last stage; see `open_stage`. Raises InputError."""
     last, locks_proven = last_stage(scene, limit_s)
     opened = open_stage(last, form, reporter, limit_s)
     return replace(opened, scene=scene, locks_proven=locks_proven)
@@ -179,7 +179,7 @@ def measurable(
     """Open or build a scene, or that of a name or path, that a solver can be measured on. Raises InputError,
     also if K is not positive definite.
     """
-    problem = opened(read_scene(source) if isinstance(source, str) else source, form, reporter, limit_s)
+    problem = open_problem(read_scene(source) if isinstance(source, str) else source, form, reporter, limit_s)
     refuse_without_contacts(problem.prepared, problem.scene.source_of("A"))
     reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()

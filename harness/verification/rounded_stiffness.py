@@ -32,7 +32,7 @@ def expected_error(prepared: Prepared, x: Vector, lam: Vector, digits: int) -> f
     return float(abs(D * dx).max(initial=0.0))
 
 
-def about(prepared: Prepared, load: LoadCase) -> Vector:
+def estimated_displacements(prepared: Prepared, load: LoadCase) -> Vector:
     """Displacements (n,) mm of about the size of the answer, by a few solutions with K.
 
     x = K⁻¹(f − Aλ) with λ = α max(p, 0), α such that the dual objective ½λᵀQλ − pᵀλ is least.

@@ -27,7 +27,10 @@ NEEDED = f"{ENOUGH} repeats of two solvers on its scene, in both runs"
 
 @dataclass(frozen=True)
 class Times:
-    """compared : the measurements whose times can be compared. slower : S of those that are slower."""
+    """The comparison of times.
+
+    compared : the measurements whose times can be compared. slower : S of those that are slower.
+    """
 
     compared: Collection[str]
     slower: Mapping[str, float]

@@ -25,7 +25,7 @@ KEPT = 2.0**40
 MAX_SETS = 10  # contact sets tried for one load case
 
 
-class Springs:
+class SprungFactors:
     """Factorisations of K with springs, in balanced units. kappa : κ ≤ λmin(K), or 0."""
 
     def __init__(self, units: Balanced, kappa: float) -> None:
@@ -38,10 +38,10 @@ class SprungContacts:
     """The closed contacts C (m,) of a load case, and a first dλ (m,).
 
     C = {λ · compliance > y}, without those whose force would become negative, with those that would overlap.
-    y, lam, compliance (m,) : gaps that dλ is to close, λ, and about the diagonal of Q.
+    y, lam, compliance (m,) : gaps that dλ is to close, λ, and estimates of the diagonal of Q.
     """
 
-    def __init__(self, springs: Springs, y: Vector, lam: Vector, compliance: Vector) -> None:
+    def __init__(self, springs: SprungFactors, y: Vector, lam: Vector, compliance: Vector) -> None:
         A, At, self.rho = springs.sprung.A, springs.sprung.A.T, springs.rho
         C = lam * compliance > y
         for _ in range(MAX_SETS):

@@ -94,8 +94,10 @@ def _short(name: str) -> str:
 
 
 def _unfinished(results: Results) -> list[str]:
-    """The suite's scenes count without those that the model rejects, as it should. With `times_best_form`,
-    libraries do not count, whose slow forms are left out on purpose.
+    """A sentence if measurements that the suite plans are missing.
+
+    Scenes that the model refuses are not planned. With `times_best_form`, libraries do not count: their slow
+    forms are left out on purpose.
     """
     rows, problems, suite = results.rows, results.problems, results.suite
     refused = set(problems.loc[problems["refused"].notna(), "scene"]) if "refused" in problems else set()

@@ -52,7 +52,7 @@ def curves(cells: pd.DataFrame) -> set[str]:
     return set(tolerances.index.get_level_values("method")[tolerances >= CURVE_POINTS])
 
 
-def swept(results: Results) -> pd.DataFrame:
+def cells_of_curves(results: Results) -> pd.DataFrame:
     """The cells that were run, with errors; none if no method has a curve."""
     cells = results.cells[~results.cells["status"].isin(NOT_RUN)]
     return with_errors(cells) if curves(cells) else with_errors(cells.iloc[:0])
@@ -71,7 +71,7 @@ def accurate(cells: pd.DataFrame, accuracy_mm: float) -> pd.Series[bool]:
     return (cells["error"] <= accuracy_mm) & ~unknown
 
 
-def judged(cells: pd.DataFrame, accuracy_mm: float) -> bool:
+def can_judge(cells: pd.DataFrame, accuracy_mm: float) -> bool:
     """Whether the references of some cells are accurate enough to decide that an error is ≤ accuracy_mm."""
     return not cells["reference_bound_mm"].max() > BOUND_SHARE * accuracy_mm
 
@@ -168,7 +168,7 @@ def recommended(
     line = {"n": cells["n"].iloc[0], "scenes": cells["scene"].nunique(), "accuracy_mm": accuracy_mm}
     line |= {"use": "none on every scene", "seconds": None, "next": "", "textbook": "", "library": ""}
     line |= {"to_next": None, "to_textbook": None, "to_library": None}
-    if accuracy_mm is not None and not judged(cells, accuracy_mm):
+    if accuracy_mm is not None and not can_judge(cells, accuracy_mm):
         return line | {"use": "cannot be judged: the reference is not accurate enough"}
     lines = fastest_first(cells, "label", seconds, accuracy_mm)
     if lines.empty:

@@ -31,7 +31,7 @@ FEWEST = 5  # sizes that a fit should have
 
 
 @lru_cache(maxsize=4)  # several sections ask for the same
-def roads(results: Results) -> pd.DataFrame:
+def stage_seconds(results: Results) -> pd.DataFrame:
     """The cells of single load cases with the seconds of each stage, 0 where there is none, `total_<k>_s` for
     each k of LOAD_CASES (missing unless the answer is within the limit and all stages are known), and
     `stored_mib`, the size of the dense matrices it needs. Empty if all have condensed matrices, or none has.

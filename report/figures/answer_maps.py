@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from report.document.numbers import significant
-from report.results.answer_record import STRESS, Answer, pair_name, stages, stress_map, von_mises
+from report.results.answer_record import STRESS, SavedAnswer, pair_name, stages, stress_map, von_mises
 
 from . import style
 from .deformed_faces import deformed_figure
@@ -26,8 +26,8 @@ from .junction_maps import (
     Marks,
     Outlines,
     Scale,
-    drawn,
     larger_than,
+    map_sheet,
     rooted,
 )
 from .node_cells import grid_of
@@ -56,7 +56,9 @@ def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str
         return figures | {"displacement": _displacement(record, arrays)}
 
 
-def _pairs(title: str, answer: Answer, values: Array, scale: Scale, outlines: Outlines = ()) -> list[Map]:
+def _pairs(
+    title: str, answer: SavedAnswer, values: Array, scale: Scale, outlines: Outlines = ()
+) -> list[Map]:
     """A map of each pair of parts. values, and the masks of the outlines : of all contacts."""
     record, arrays = answer
     maps = []
@@ -80,7 +82,7 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         _pairs(name, (record, arrays), gap, rooted(f"{name}, mm", "viridis", gap), lines)
         for name, gap, lines in zip(("gap before", "gap after"), gaps, ((), outlines), strict=True)
     ]
-    return drawn([item for pair in zip(*sides, strict=True) for item in pair], 2)[0]
+    return map_sheet([item for pair in zip(*sides, strict=True) for item in pair], 2)[0]
 
 
 def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
@@ -115,7 +117,7 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
         answer = record | {"marks": stage["marks"]}, arrays
         here = _pairs(stage["name"], answer, values, scale, larger)
         maps += [replace(item, title=_outcome(line)) for item in here] if len(here) == 1 else here
-    return {"history": history, "stage-gaps": drawn(maps, 2)[0]}
+    return {"history": history, "stage-gaps": map_sheet(maps, 2)[0]}
 
 
 def _outcome(stage: Mapping[Any, Any]) -> str:
@@ -130,7 +132,7 @@ def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     outlines = [(lam > 0, RIM, "closed contacts")]
     forces, scale = np.where(lam > 0, lam, np.nan), rooted("force, N", "magma_r", lam)
     maps = _pairs("contact forces", (record, arrays), forces, scale, outlines)
-    return drawn(maps, len(maps))[0]
+    return map_sheet(maps, len(maps))[0]
 
 
 def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
@@ -143,7 +145,7 @@ def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         title = f"displacement of {part['name']}"
         maps.append(Map(title, arrays["nodes"][here], x[here], scale, (), _marks(record, part)))
     corners = np.array([(x, y) for part in parts for x in part["outline"][:2] for y in part["outline"][2:]])
-    figure, panels = drawn(maps, len(parts), corners)
+    figure, panels = map_sheet(maps, len(parts), corners)
     for axes, part in zip(panels, parts, strict=True):
         west, east, south, north = part["outline"]
         axes.spines[:].set_visible(False)
@@ -167,14 +169,14 @@ def _stress(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         title = f"von Mises stress of {part['name']}"
         if len(places):
             maps.append(Map(title, places, highest, scale, outlines, _marks(record, part)))
-    return drawn(maps, len(maps))[0]
+    return map_sheet(maps, len(maps))[0]
 
 
 def _marks(record: dict[str, Any], part: dict[str, Any]) -> Marks:
     return record["marks"] | ({"supports": part["supports"]} if part["supports"] else {})
 
 
-def gap_maps(answers: list[Answer], names: list[str], common: list[Answer]) -> dict[str, Figure]:
+def gap_maps(answers: list[SavedAnswer], names: list[str], common: list[SavedAnswer]) -> dict[str, Figure]:
     """`gaps`, all pairs of two scenes on one scale; `difference`, second minus first at common places."""
     (_, one), (_, other) = answers
     scale = rooted("gap, mm", "viridis", one["gap_after"], other["gap_after"])
@@ -187,5 +189,5 @@ def gap_maps(answers: list[Answer], names: list[str], common: list[Answer]) -> d
         sides.append(_pairs(f"{name}: gap", (record, arrays), arrays["gap_after"], scale, closed))
     changes = _pairs(f"{names[1]} minus {names[0]}", common[1], change, both)
     with style.applied():
-        sheet, _ = drawn([item for pair in zip(*sides, strict=True) for item in pair], 2)
-        return {"gaps": sheet, "difference": drawn(changes, len(changes))[0]}
+        sheet, _ = map_sheet([item for pair in zip(*sides, strict=True) for item in pair], 2)
+        return {"gaps": sheet, "difference": map_sheet(changes, len(changes))[0]}

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure as Drawing
 from report.results.series_results import AT_ONCE, Array, Series
 
 from . import style
-from .junction_maps import Map, Scale, drawn
+from .junction_maps import Map, Scale, map_sheet
 
 ORDERS = {"first_order": style.BLUE, "total_order": style.VERMILLION}
 ENDS, RESAMPLES = (0.025, 0.975), 999
@@ -80,7 +80,7 @@ def maps(series: Series, nodes: Array) -> tuple[Drawing, pd.DataFrame]:
     pairs = zip(names, shares[1], strict=True)
     shown = [Map(name, nodes, share, scale, (), series.marks) for name, share in pairs]
     columns = ["x_mm", "y_mm", *(f"{name}, {order}" for order in ORDERS for name in names)]
-    return drawn(shown, 3)[0], pd.DataFrame(np.vstack([nodes[:, :2].T, *shares]).T, columns=columns)
+    return map_sheet(shown, 3)[0], pd.DataFrame(np.vstack([nodes[:, :2].T, *shares]).T, columns=columns)
 
 
 def bars(table: pd.DataFrame) -> Drawing:

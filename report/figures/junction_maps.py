@@ -74,7 +74,7 @@ class Map:
     marks: Marks = field(default_factory=dict)
 
 
-def drawn(maps: Sequence[Map], beside: int, corners: Array | None = None) -> tuple[Figure, list[Axes]]:
+def map_sheet(maps: Sequence[Map], beside: int, corners: Array | None = None) -> tuple[Figure, list[Axes]]:
     """A sheet of maps with a colour bar for each scale, and a legend of the marks. Maps of a wide strip are
     stacked, of an upright one all side by side, of another region `beside` and at most three per row.
 

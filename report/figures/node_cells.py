@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from problems.model.surface import surface_of
 
 Array = NDArray[np.float64]
-Grid = tuple[Array, Array, NDArray[np.intp]]
+TensorGrid = tuple[Array, Array, NDArray[np.intp]]
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 LAST = 7.0  # an angle beyond 2π
 
 
-def grid_of(nodes: Array) -> Grid | None:
+def grid_of(nodes: Array) -> TensorGrid | None:
     """x, y and the place of each node if the nodes are a full tensor grid, else None."""
     x, column = np.unique(np.round(nodes[:, 0], 6), return_inverse=True)
     y, row = np.unique(np.round(nodes[:, 1], 6), return_inverse=True)

@@ -6,7 +6,7 @@ from report.document.numbers import coordinate, listed, out_of, position, signif
 from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
 from report.page.page_figures import map_item
 from report.page.page_file import Data, banner
-from report.results.answer_record import Answer, fasteners, pair_name, stages
+from report.results.answer_record import SavedAnswer, fasteners, pair_name, stages
 from report.results.series_results import Array
 
 CODE = ("machine", "commit", "clean", "recorded_at")
@@ -102,7 +102,7 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
     return {"kind": kind, "text": f"{verdict}; {largest}{near}."}
 
 
-def two_answers_data(answers: list[Answer]) -> Data:
+def two_answers_data(answers: list[SavedAnswer]) -> Data:
     """The data of the page of two answers on one junction."""
     records = [record for record, _ in answers]
     named = [f"{record['scene']}: {record['title']}, {record['method']}" for record in records]

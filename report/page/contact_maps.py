@@ -39,7 +39,7 @@ def scene_maps(results: Results) -> Data:
         elif arrays:
             fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
             marks = arrays.get("fasteners", NO_MARKS)
-            if not _added(page, scene, arrays["contact_nodes"], fields, marks, BUDGET):
+            if not _add_map(page, scene, arrays["contact_nodes"], fields, marks, BUDGET):
                 page["left_out"].append(scene)
     if page["left_out"]:
         for made in page["maps"]:
@@ -58,7 +58,7 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
         places, highest, unread = stress_map(arrays, k)
         values, name = np.where(unread, np.nan, highest), f"stress of {part['name']}"
         if len(places):
-            _added(page, name, places, {STRESS: values}, _marked(record), noun="place")
+            _add_map(page, name, places, {STRESS: values}, _marked(record), noun="place")
     check, stress = record.get("allowed_gap") or {}, record.get("stress") or {}
     return _limited(page, check.get("allowed_mm"), stress.get("allowed"))
 
@@ -89,7 +89,7 @@ def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array]) -> 
     for pair in record["pairs"] if "contact_nodes" in arrays else ():
         contacts = slice(pair["start"], pair["stop"])
         of_pair = {name: values[contacts] for name, values in fields.items()}
-        _added(page, pair_name(pair), arrays["contact_nodes"][contacts], of_pair, marks)
+        _add_map(page, pair_name(pair), arrays["contact_nodes"][contacts], of_pair, marks)
     return page
 
 
@@ -109,7 +109,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     step = _step(len(series.nodes))
     curves = _exceeded(series, step)
     maps = dict(zip(names, quantiles, strict=True))
-    _added(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners)
+    _add_map(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners)
     (made,) = page["maps"]
     worst, *others = _chosen(series)
     spent, cases = _size(made["fields"]) + len(curves), {}
@@ -167,7 +167,7 @@ def _empty() -> Data:
     return {"groups": [], "maps": [], "left_out": []}
 
 
-def _added(
+def _add_map(
     page: Data,
     name: str,
     nodes: Array,
@@ -176,7 +176,7 @@ def _added(
     budget: float = np.inf,
     noun: str = "contact",
 ) -> bool:
-    """Whether the map fitted into the page."""
+    """Add a map to the page if it fits into the budget; returns whether it did."""
     step = _step(len(nodes))
     place = {side: exact(values) for side, values in _cells(nodes[::step]).items()}
     made = {text: _field(text, values[::step]) for text, values in fields.items()}

@@ -18,7 +18,7 @@ import pandas as pd
 
 from harness.results.schema import LADDERS
 from report.analysis.checks import warnings
-from report.analysis.time_to_solution import STAGES, roads
+from report.analysis.time_to_solution import STAGES, stage_seconds
 from report.document.blocks import records
 from report.document.numbers import counted, listed
 from report.figures.style import line_styles
@@ -137,7 +137,7 @@ def _cells(results: Results) -> pd.DataFrame:
     cells = results.about("whole").cells
     cells = cells[cells["status"] != "unsupported"]
     cells = cells.rename(columns={"reference_bound_mm": "bound_mm"})
-    lines = pd.concat(map(roads, results.by_machine()))
+    lines = pd.concat(map(stage_seconds, results.by_machine()))
     if len(lines):
         lines = lines.assign(scene_s=lines[list(STAGES)].sum(axis=1, skipna=False))
         cells = cells.merge(lines[[*CELL, "scene_s"]], on=CELL, how="left")

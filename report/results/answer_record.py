@@ -13,11 +13,11 @@ from report.document.numbers import position
 
 from .series_results import Array
 
-Answer = tuple[dict[str, Any], dict[str, Array]]
+SavedAnswer = tuple[dict[str, Any], dict[str, Array]]
 
 
-def read(directory: Path) -> Answer:
-    """What solution.json and solution.npz hold."""
+def read(directory: Path) -> SavedAnswer:
+    """The content of solution.json and solution.npz."""
     record = quoted(json.loads((directory / "solution.json").read_text("utf-8")))
     with np.load(directory / "solution.npz") as saved:
         return record, {name: saved[name] for name in saved.files}

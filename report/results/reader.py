@@ -1,4 +1,4 @@
-"""What a results directory holds, read into data frames.
+"""Reads a results directory into data frames.
 
 `rows` has one row per measurement, `cells` one per scene, solver and settings (CELL of rows.py), with the
 repeats merged.

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, of_kind
-from harness.results.searches import chosen
+from harness.results.counted_rows import chosen
+from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, fields_of_kind
 from report.document.numbers import counted, tidy_power
 
-NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
+NUMBERS, TEXTS, FLAGS = fields_of_kind("number"), fields_of_kind("text"), fields_of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
 CELL = ["machine", "scene", "solver", "form", "variant", "settings", "batched_asked"]
 CELL += ["tolerance", "threads_asked", "round"]

@@ -10,11 +10,11 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from report.analysis.standings import (
     ACCURACIES,
+    can_judge,
+    cells_of_curves,
     curves,
     fastest_first,
-    judged,
     pareto,
-    swept,
 )
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
@@ -30,7 +30,7 @@ STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, 
 
 def costs(results: Results) -> Section | None:
     """Time against error by size, and the time to reach each of ACCURACIES."""
-    cells = swept(results)
+    cells = cells_of_curves(results)
     if cells["error"].isna().all():
         return None
     sizes = [of_size for _, of_size in cells.groupby("n")]
@@ -68,7 +68,7 @@ def _missed(runs: pd.DataFrame, accuracy: float, scenes: int) -> str:
     """Why a method has no price: the time limit only where no answer missed the accuracy."""
     if runs["scene"].nunique() < scenes:
         return MISSING
-    if not judged(runs, accuracy):
+    if not can_judge(runs, accuracy):
         return "cannot be judged"
     late = runs["error"].isna() & (runs["status"] == "time_limit")
     if runs.loc[late | (runs["error"] <= accuracy), "scene"].nunique() == scenes:
@@ -116,7 +116,7 @@ def _diagram(cells: pd.DataFrame, limit: str) -> Figure:
 
 def tolerances(results: Results) -> Section | None:
     """Whose tolerance can be trusted."""
-    if swept(results).empty or (lines := trust(results)).empty:
+    if cells_of_curves(results).empty or (lines := trust(results)).empty:
         return None
     columns = [
         word("solver (form)", "method"),

@@ -162,7 +162,7 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
 
 
 def rungs(results: Results) -> Section | None:
-    """The rungs themselves, and the input that the model rejects."""
+    """The rungs themselves, and the input that the model refuses."""
     if results.cells.empty or "scene" not in results.problems:
         return None
     problems = results.problems[results.problems["scene"].str.startswith(LADDERS)]
@@ -187,7 +187,7 @@ def rungs(results: Results) -> Section | None:
         refused = refused.replace({"refused": {"": "**accepted, although the model does not cover it**"}})
         columns = [word("rung", "scene"), word("description", "title"), word("error message", "refused")]
         caption = (
-            "*What the model rejects, as it should*: a clear error rather than a plausible wrong answer."
+            "*What the model refuses, as it should*: a clear error rather than a plausible wrong answer."
         )
         blocks.append(Table("rungs-refused", caption, refused, columns))
     return Section("The rungs", blocks)

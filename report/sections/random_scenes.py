@@ -100,7 +100,7 @@ def _to_textbook(cells: pd.DataFrame, limit: str) -> Table:
     columns = [*OF_METHOD, *ratios, WORST]
     caption = (
         f"*Joints of superelements, preparation included*: answers that are solved and within {limit}, and "
-        "their times relative to the fastest textbook method's; –: there is an answer missing."
+        "their times relative to the fastest textbook method's; –: an answer is missing."
     )
     return Table("drawn-superelements", caption, pd.DataFrame(lines), columns)
 

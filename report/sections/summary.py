@@ -12,12 +12,12 @@ from report.analysis.standings import (
     ACCURACIES,
     SHIFT_S,
     best_tolerances,
+    cells_of_curves,
     recommended,
     shown,
     standings,
-    swept,
 )
-from report.analysis.time_to_solution import roads
+from report.analysis.time_to_solution import stage_seconds
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.numbers import MISSING, listed, power, significant, tidy_power, whole
 from report.figures.line_charts import Cell, Group, grid
@@ -37,9 +37,13 @@ def advice(results: Results) -> Section | None:
     cells = results.cells[results.cells["status"] != "unsupported"]
     if not cells.groupby("n")["method"].nunique().max() >= 2:
         return None
-    ways = roads(results)
-    counted = [(EACH, cells, "load_case_s"), (PREPARED, cells, "total_s"), (FROM_SCENE, ways, "total_1_s")]
-    lines, sweep = [], swept(results)
+    cells_by_stage = stage_seconds(results)
+    counted = [
+        (EACH, cells, "load_case_s"),
+        (PREPARED, cells, "total_s"),
+        (FROM_SCENE, cells_by_stage, "total_1_s"),
+    ]
+    lines, sweep = [], cells_of_curves(results)
     for n in results.sizes:
         limit = cells.loc[cells["n"] == n, "limit_mm"].max()
         for what, among, seconds in counted:

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from harness.results.schema import OWNERS
 from report.analysis.standings import best_tolerances, seconds_text
-from report.analysis.time_to_solution import LOAD_CASES, STAGES, roads
+from report.analysis.time_to_solution import LOAD_CASES, STAGES, stage_seconds
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.escape import short
 from report.document.numbers import MISSING, counted, significant, whole
@@ -90,19 +90,21 @@ def ours_and_others(results: Results) -> pd.DataFrame:
     What was measured beside a round of ours (suite.py, `beside`) is compared with the fastest of that round.
     Empty unless libraries and textbook methods were measured on these scenes, in sparse and in dense forms.
     """
-    ways = roads(replace(results, rows=pd.concat([results.rows, results.rounds], ignore_index=True)))
-    if ways.empty or not set(OWNERS) <= set(ways["owner"]):
+    rows = pd.concat([results.rows, results.rounds], ignore_index=True)
+    cells_by_stage = stage_seconds(replace(results, rows=rows))
+    if cells_by_stage.empty or not set(OWNERS) <= set(cells_by_stage["owner"]):
         return pd.DataFrame()
-    within = ways["verdict"] == "within"
-    beside = ways["round"].where(ways["round"] != "", ways["beside_round"])
-    at, ours, lines = [ways["machine"], ways["scene"], beside], ways["owner"] == "ours", []
+    within = cells_by_stage["verdict"] == "within"
+    beside = cells_by_stage["round"].where(cells_by_stage["round"] != "", cells_by_stage["beside_round"])
+    at, ours = [cells_by_stage["machine"], cells_by_stage["scene"], beside], cells_by_stage["owner"] == "ours"
+    lines: list[dict[str, Any]] = []
     for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
-        taken = ways[seconds].where(within).fillna(np.inf)
+        taken = cells_by_stage[seconds].where(within).fillna(np.inf)
         own = taken.where(ours & np.isfinite(taken))
-        alone = own.where(beside == "").groupby(ways["scene"]).transform("min")
-        times = (taken / own.groupby(at).transform("min")).where(ways["round"] == "")
-        ways = ways.assign(fastest=(times * alone).where(np.isfinite(taken) | ~ours))
-        fastest = ways.groupby(["n", "scene", "owner"])["fastest"].min().unstack("owner")
+        alone = own.where(beside == "").groupby(cells_by_stage["scene"]).transform("min")
+        times = (taken / own.groupby(at).transform("min")).where(cells_by_stage["round"] == "")
+        cells_by_stage = cells_by_stage.assign(fastest=(times * alone).where(np.isfinite(taken) | ~ours))
+        fastest = cells_by_stage.groupby(["n", "scene", "owner"])["fastest"].min().unstack("owner")
         solved = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
         lines += [
             {"question": question, "n": n} | against_ours(of_size) for n, of_size in solved.groupby("n")
@@ -125,7 +127,7 @@ def against_ours(fastest: pd.DataFrame) -> dict[str, Any]:
 
 def section(results: Results) -> Section | None:
     """Seconds of each stage, in a run with sparse and dense forms."""
-    lines = roads(results)
+    lines = stage_seconds(results)
     if lines.empty:
         return None
     order = in_order(lines)

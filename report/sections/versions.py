@@ -34,7 +34,7 @@ def section(results: Results) -> Section | None:
 
 
 def _blocks(solver: str, cells: pd.DataFrame) -> list[Block]:
-    worse, compared = cells["group"] == WORSE, int(cells["group"].notna().sum())
+    worse, compared_count = cells["group"] == WORSE, int(cells["group"].notna().sum())
     lost = cells["verdict"] == "no_answer"
     cells = cells.assign(
         verdict=cells["verdict"].str.replace("_", " "),
@@ -51,7 +51,7 @@ def _blocks(solver: str, cells: pd.DataFrame) -> list[Block]:
         word("verdict", "verdict"),
         word("against the version above", "against"),
     ]
-    count = f"{out_of(worse.sum(), compared, 'measurement')} became worse"
+    count = f"{out_of(worse.sum(), compared_count, 'measurement')} became worse"
     count += f", {counted(int(lost.sum()), 'measurement')} without an answer" if lost.any() else ""
     blocks: list[Block] = [Table(f"versions-{file_name(solver)}", f"*{solver}*: {count}.", cells, columns)]
     failed = records(cells[cells["status"].isin(["failed", "crashed"]) & (cells["message"] != "")])

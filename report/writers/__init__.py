@@ -1,1 +1,1 @@
-"""Pages on disk: Markdown, pictures, CSV, VTU."""
+"""Files on disk: Markdown, pictures, CSV, VTU, pages in HTML, sheets in PDF."""

@@ -31,7 +31,7 @@ from report.writers.sections_writer import written
 from report.writers.sheet import Sheet, exactness, origin, write_sheet
 
 #: Points, cells and point data for meshio.
-Grid = tuple[Array, list[tuple[str, Any]], dict[str, Array]]
+MeshData = tuple[Array, list[tuple[str, Any]], dict[str, Array]]
 
 CAPTIONS = {
     "history": "*The largest gap, and the sums of the forces,* at the end of each stage.",
@@ -170,7 +170,7 @@ def _skipped(record: dict[str, Any]) -> list[Block]:
 
 
 def write_vtu(
-    path: Path, record: dict[str, Any], arrays: dict[str, Any], grid: Callable[..., Grid] | None = None
+    path: Path, record: dict[str, Any], arrays: dict[str, Any], grid: Callable[..., MeshData] | None = None
 ) -> str:
     """Write the parts' junction nodes with their fields. Returns the file's name, or why it was not written,
     since meshio is optional. grid : makes points, cells and point data; by default of those nodes.
@@ -186,7 +186,7 @@ def write_vtu(
     return path.name
 
 
-def grid_with_stresses(record: dict[str, Any], arrays: dict[str, Any]) -> Grid:
+def grid_with_stresses(record: dict[str, Any], arrays: dict[str, Any]) -> MeshData:
     """Points, cells and point data of the stresses, N/mm²; side as in `PartStress`; not_to_be_read 0 or 1."""
     part, places = arrays["stress_part"], arrays["stress_places"]
     components = dict(zip(("sxx", "syy", "sxy"), arrays["stress"].T, strict=True))
@@ -198,7 +198,7 @@ def grid_with_stresses(record: dict[str, Any], arrays: dict[str, Any]) -> Grid:
     return np.column_stack([places, np.zeros(len(places))]), blocks, data
 
 
-def grid_with_fields(record: dict[str, Any], arrays: dict[str, Any]) -> Grid:
+def grid_with_fields(record: dict[str, Any], arrays: dict[str, Any]) -> MeshData:
     """Points (n, 3), cells and point data for meshio."""
     nodes, n = arrays["nodes"], len(arrays["nodes"])
     force, initial, remaining = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)

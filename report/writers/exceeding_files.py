@@ -6,7 +6,7 @@ import pandas as pd
 from matplotlib.colors import Normalize
 
 from report.figures import style
-from report.figures.junction_maps import Map, Scale, drawn
+from report.figures.junction_maps import Map, Scale, map_sheet
 from report.results.series_results import Array, Series
 
 
@@ -23,6 +23,6 @@ def write(directory: Path, series: Series, allowed_mm: float, shares: Array, lar
         scale = Scale("share of cases, %", "magma_r", Normalize(0.0, float(percent.max()) or 1.0))
         title = f"cases with a gap of more than {allowed_mm:g} mm"
         with style.applied():
-            drawing, _ = drawn([Map(title, series.nodes, percent, scale)], 1)
+            drawing, _ = map_sheet([Map(title, series.nodes, percent, scale)], 1)
             drawing.savefig(directory / "allowed-gap.png", dpi=style.DPI)
     table.to_csv(directory / "allowed-gap.csv", index_label="contact")

@@ -13,7 +13,7 @@ from report.document.blocks import Block, Column, Figure, Section, Table, Text, 
 from report.document.escape import quoted
 from report.document.numbers import coordinate, counted, out_of, significant, whole
 from report.figures import style
-from report.figures.junction_maps import Map, drawn, larger_than, rooted
+from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.results.series_results import read as read_series
 from report.writers.sections_writer import emptied, written
 from report.writers.sheet import MESH, Sheet, exactness, origin, write_sheet
@@ -153,7 +153,7 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
     caption = f"*The gap at each contact that {100 * share:.4g} % of the fresh cases keep*, before and after."
     table = pd.DataFrame({"x_mm": shown[0][1][:, 0], "y_mm": shown[0][1][:, 1]})
     table = table.assign(**{f"{name}_mm": gap for name, (_, _, gap, _) in zip(names, shown, strict=True)})
-    return [Figure("before-and-after", caption, drawn(maps, 1)[0], table)]
+    return [Figure("before-and-after", caption, map_sheet(maps, 1)[0], table)]
 
 
 def _order(record: dict[str, Any]) -> list[Block]:

@@ -12,7 +12,7 @@ from report.document.blocks import Figure, Section, Table, Text, facts_table, nu
 from report.document.escape import file_name
 from report.document.numbers import counted, out_of, significant, tidy_power
 from report.figures import style
-from report.figures.junction_maps import Map, drawn, larger_than, rooted
+from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.page.contact_maps import hover_names, map_controls, series_maps
 from report.page.page_figures import exceedance_figure, item, map_item
 from report.page.page_file import Data, banner
@@ -42,7 +42,7 @@ CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": 
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report/report.md from the series in DIRECTORY, with index.html and sheet.pdf beside it.
 
-    Returns the path of the first.
+    Returns the path of report.md.
     """
     series = read(directory)
     target = emptied(directory / "report")
@@ -142,8 +142,8 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
     caption = "*The remaining gap at each contact: quantiles over the cases.*"
     of_worst = f"*The worst case, number {case}, with a largest gap of {significant(gap.max())} mm.*"
     return [
-        Figure("quantile-maps", caption, drawn(quantiles, 3)[0], places.assign(**values)),
-        Figure("worst-case", of_worst, drawn([worst], 1)[0], places.assign(gap_mm=gap)),
+        Figure("quantile-maps", caption, map_sheet(quantiles, 3)[0], places.assign(**values)),
+        Figure("worst-case", of_worst, map_sheet([worst], 1)[0], places.assign(gap_mm=gap)),
     ]
 
 

@@ -33,7 +33,7 @@ NEAR = 0.9  # of the limit: a gap is at it
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report.md from the record in DIRECTORY, with index.html and sheet.pdf beside it.
 
-    Returns the path of the first.
+    Returns the path of report.md.
     """
     record = quoted(json.loads((directory / "shim.json").read_text("utf-8")))
     patches, title = pd.DataFrame(record["patches"]), f"Shims: {record['title']}"

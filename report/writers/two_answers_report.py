@@ -14,7 +14,7 @@ from report.document.numbers import coordinate, counted, position, significant, 
 from report.figures.answer_maps import gap_maps
 from report.page.answer_page_data import headline, two_answers_data
 from report.page.page_file import write as write_page
-from report.results.answer_record import Answer, contacts, fasteners, pair_name, read
+from report.results.answer_record import SavedAnswer, contacts, fasteners, pair_name, read
 from report.writers.sections_writer import written
 
 SIDES = ("first", "second")
@@ -29,8 +29,8 @@ def write(
 ) -> tuple[Path, pd.DataFrame, list[str]]:
     """Write DIRECTORY/comparison.md, with index.html, from two of its folders.
 
-    Returns the path of the former, the figures per pair, and sentences on two meshes. weights : those of the
-    contacts of either answer at common places, pair by pair; None if their contacts are the same.
+    Returns the path of comparison.md, the figures per pair, and sentences on two meshes. weights : those of
+    the contacts of either answer at common places, pair by pair; None if their contacts are the same.
     """
     answers = [read(directory / folder) for folder in folders]
     common = answers if weights is None else [*map(_at_places, answers, zip(*weights, strict=True))]
@@ -66,7 +66,7 @@ def write(
     return written(directory / "comparison.md", title, sections, files=files), pairs, said
 
 
-def _at_places(answer: Answer, weights: Sequence[sp.csr_array]) -> Answer:
+def _at_places(answer: SavedAnswer, weights: Sequence[sp.csr_array]) -> SavedAnswer:
     """The gaps of an answer at common places; no forces, which are those of the contacts of one mesh."""
     (record, arrays), W = answer, sp.block_diag(weights, format="csr")
     stops = np.cumsum([some.shape[0] for some in weights]).tolist()
@@ -76,7 +76,7 @@ def _at_places(answer: Answer, weights: Sequence[sp.csr_array]) -> Answer:
     return record | {"pairs": pairs}, gaps | {"lam": np.full(W.shape[0], np.nan)}
 
 
-def _said_of_meshes(answers: list[Answer], table: pd.DataFrame) -> Iterator[str]:
+def _said_of_meshes(answers: list[SavedAnswer], table: pd.DataFrame) -> Iterator[str]:
     """Yield where the gaps on two meshes differ most, and what the mesh does to the verdict."""
     change, nodes = table["change_mm"].abs().to_numpy(), table[["x_mm", "y_mm"]].to_numpy()
     k = int(change.argmax())
@@ -94,7 +94,7 @@ def _said_of_meshes(answers: list[Answer], table: pd.DataFrame) -> Iterator[str]
         yield f"With a limit of {checks[0]['allowed_mm']:g} mm, {verdict}."
 
 
-def _pair(both: Sequence[dict[str, Any]], answers: list[Answer], table: pd.DataFrame) -> dict[str, Any]:
+def _pair(both: Sequence[dict[str, Any]], answers: list[SavedAnswer], table: pd.DataFrame) -> dict[str, Any]:
     """The figures of a pair of parts in both scenes."""
     line: dict[str, Any] = {"contact": pair_name(both[0])}
     for side, pair, (_, arrays) in zip(SIDES, both, answers, strict=True):
@@ -139,7 +139,7 @@ def _fasteners(records: list[dict[str, Any]]) -> pd.DataFrame:
     return pd.concat([one, other], axis=1).reset_index()
 
 
-def _contacts(answers: list[Answer]) -> pd.DataFrame:
+def _contacts(answers: list[SavedAnswer]) -> pd.DataFrame:
     """One line per contact: where it is, and its gaps and forces in both scenes."""
     first, second = (contacts(*answer) for answer in answers)
     table = first[[name for name in first if name in ("contact", "x_mm", "y_mm")]].copy()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from harness.conformance.known_problems import known_problems
-from harness.solving.session import no_answer
 from harness.solving.solver_answer import LARGEST_DETAILS, InvalidAnswer, checked, examined, figures
+from harness.solving.solver_session import no_answer
 from problems.forms.problem import Problem, in_form
 from solvers.base import Answer, Status
 

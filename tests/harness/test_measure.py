@@ -12,7 +12,7 @@ import tiny_joint
 from suite_runs import all_end
 
 from harness.measurement import child_process
-from harness.measurement.worker import Outcome, measure
+from harness.measurement.worker import FinishedReport, measure
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 
@@ -44,7 +44,7 @@ def outcome(
     plugin: bool = True,
     memory_limit_mib: int = 8192,
     **changes: Any,
-) -> Outcome:
+) -> FinishedReport:
     """The row of a measurement, which leaves no process, not even one whose parent is gone."""
     name = solver or ("faulty" if fault else "exact")
     entry = SolverEntry(name=name, options={"fault": fault} if fault else {})

@@ -10,7 +10,7 @@ from commands import harness
 from synthetic_results import row, write_rows
 
 from harness.results import records
-from report.analysis.time_to_solution import roads
+from report.analysis.time_to_solution import stage_seconds
 from report.results.reader import read
 
 FAST, SLOW = "A fast CPU, 64 cores", "A slow CPU, 1 core"
@@ -60,7 +60,7 @@ def test_no_ratio_is_of_two_machines(both: tuple[Path, Path], tmp_path: Path) ->
         seconds = 2.0 if part.rows["machine"].iloc[0] == FAST else 1446.0
         assert set(part.cells["load_case_s"]) == {seconds}
         assert set(part.problems["machine"]) == set(part.rows["machine"])
-        dense = roads(part)[lambda lines: lines["form"] == "dual"]
+        dense = stage_seconds(part)[lambda lines: lines["form"] == "dual"]
         assert set(dense["K_s"]) == {seconds}
 
 

@@ -79,5 +79,5 @@ def test_gaps_that_no_mesh_moves_leave_nothing_out() -> None:
 
 def test_a_mesh_without_an_answer_costs_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     found = strips(*PLANS["pressure"])
-    monkeypatch.setattr("harness.scene.mesh_error.candidates", lambda *_: iter(()))
+    monkeypatch.setattr("harness.scene.mesh_error.candidate_forces", lambda *_: iter(()))
     assert estimated(found) is None

@@ -244,13 +244,13 @@ def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> Non
     goal = Goal(0.1, share, None)
     for alpha in (0.05, 0.025, 0.0125):
         n = goal.fresh(alpha)
-        c = goal.failing(n, alpha)
+        c = goal.allowed_fresh(n, alpha)
         low = binomtest(n - c, n).proportion_ci(1 - alpha, "exact").low
         lower = binomtest(n - c - 1, n).proportion_ci(1 - alpha, "exact").low
         assert lower < share <= low
         assert binom.cdf(c, n, (1 - share) / 2) >= 0.8
-    assert goal.failing(goal.least(0.025), 0.05) == 0
-    assert goal.failing(goal.least(0.025) - 1, 0.05) == -1
+    assert goal.allowed_fresh(goal.least(0.025), 0.05) == 0
+    assert goal.allowed_fresh(goal.least(0.025) - 1, 0.05) == -1
 
 
 @pytest.mark.slow
@@ -514,12 +514,12 @@ def test_a_limit_that_no_plan_keeps_says_where_and_by_how_much(strip: Path, tmp_
 
 def test_a_share_needs_cases_to_show_it() -> None:
     """Of those that choose half as many may fail as in all."""
-    assert Goal(0.1, 0.95, None).allowed(200) == 5
-    assert Goal(0.1, 1.0, None).allowed(1) == 0
-    assert Goal(0.1, 0.95, None).allowed(59) == 1
-    assert Goal(0.1, 0.01, None).allowed(10) == 4
+    assert Goal(0.1, 0.95, None).allowed_choosing(200) == 5
+    assert Goal(0.1, 1.0, None).allowed_choosing(1) == 0
+    assert Goal(0.1, 0.95, None).allowed_choosing(59) == 1
+    assert Goal(0.1, 0.01, None).allowed_choosing(10) == 4
     with pytest.raises(InputError, match="take 59, or a share of 1"):
-        Goal(0.1, 0.95, None).allowed(58)
+        Goal(0.1, 0.95, None).allowed_choosing(58)
 
 
 @pytest.mark.parametrize(

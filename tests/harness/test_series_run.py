@@ -23,7 +23,7 @@ from harness.series import session as session_module
 from harness.series.load_case_source import GapCases
 from harness.series.run import summary
 from harness.series.session import Job, Result, SeriesOptions, SeriesSession
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.problem import Dual
 from problems.load_cases.random_gaps import random_gaps

@@ -22,10 +22,10 @@ from harness.placement.fresh_cases import Goal
 from harness.placement.session import Outcome, PlanSession, Question
 from harness.planning.form_choice import Choice
 from harness.series.load_case_source import GapCases
-from harness.shimming.each import each_joint
 from harness.shimming.gap_regions import patches_of_gap
+from harness.shimming.joint_shims import each_joint
 from harness.shimming.patches import patches_of, stock_of
-from harness.shimming.search import ShimSearch
+from harness.shimming.shim_search import ShimSearch
 from harness.shimming.study import ShimStudy
 from problems.build import load_case
 from problems.effects.shims import Shims
@@ -182,7 +182,7 @@ def test_patches_of_a_gap_need_shims_that_change_nothing_else(strip: Path) -> No
 def test_what_could_not_be_read_is_refused_before_the_search(
     strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("harness.shimming.run.edited", lambda *_: "joint = 1\n")
+    monkeypatch.setattr("harness.shimming.shim_run.edited", lambda *_: "joint = 1\n")
     done = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1)
     assert done.exit_code == 2
     assert "shimmed.toml: joint = 1" in done.output

@@ -17,7 +17,7 @@ from harness import solve, stresses
 from harness.placement.session import PlanSession, Question
 from harness.series.load_case_source import GapCases
 from harness.shimming.patches import patches_of
-from harness.shimming.search import ShimSearch
+from harness.shimming.shim_search import ShimSearch
 from harness.shimming.study import ShimStudy
 from problems.build import load_case
 from problems.effects.shims import Shims

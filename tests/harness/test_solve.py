@@ -118,7 +118,7 @@ def test_an_answer_outside_the_limit_fails(tmp_path: Path) -> None:
 
 def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
-    monkeypatch.setattr("harness.solving.session.forces_of", lambda *_: pytest.fail("a QP was solved"))
+    monkeypatch.setattr("harness.solving.solver_session.forces_of", lambda *_: pytest.fail("a QP was solved"))
     record = run(tmp_path, APART, solver="piqp")
     assert not record["qp"]
     assert record["code"] == 0

@@ -24,7 +24,7 @@ from harness.terminal import FAILED, GAP_EXCEEDED
 from harness.verification import reference_problem
 from harness.verification.judge import Reference
 from harness.verification.reference import reference_of
-from harness.verification.reference_problem import last_stage, opened
+from harness.verification.reference_problem import last_stage, open_problem
 from problems.forms import Form
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
@@ -69,7 +69,7 @@ def staged(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_the_problem_is_the_last_stage(staged: Path, form: Form) -> None:
     scene, answer = read_scene(str(staged)), solve(str(staged), form=form)
-    problem = opened(scene, form)
+    problem = open_problem(scene, form)
     assert problem.scene.key == scene.key
     assert abs(problem.load.f - answer.problem.load.f).max() <= 1e-8
     x = problem.prepared.assembly.at_junction(problem.reference.x)
@@ -89,13 +89,13 @@ def test_an_answer_to_unproven_approaches_is_not_proven(
 
     with monkeypatch.context() as patch:
         patch.setattr(reference_problem, "reference_of", known_to_a_micrometre)
-        problem = opened(read_scene(str(staged)))
+        problem = open_problem(read_scene(str(staged)))
         assert problem.reference.bound_mm == np.inf
         x, lam = problem.reference.x, problem.reference.lam
         assert problem.judged(x, lam, 1e-7).verdict == "cannot_be_judged"
         known = [np.isfinite(stage.gap_error_mm).all() for stage in solve(str(staged)).stages]
         assert known == [True, True, False]
-    proven = opened(read_scene(str(staged))).reference
+    proven = open_problem(read_scene(str(staged))).reference
     assert proven.bound_mm <= 1e-9
     assert solve(str(staged)).gap_error_mm.max() <= 1e-7
 
@@ -109,7 +109,7 @@ def test_what_is_measured_is_the_last_stage(staged: Path, tmp_path: Path) -> Non
     (load,) = load_cases(scene, measurements)
     assert isinstance(scene, JointScene)
     assert scene.stages == ()
-    np.testing.assert_array_equal(load.f, opened(read_scene(str(staged))).load.f)
+    np.testing.assert_array_equal(load.f, open_problem(read_scene(str(staged))).load.f)
 
 
 def test_export_is_the_last_stage(staged: Path, tmp_path: Path) -> None:

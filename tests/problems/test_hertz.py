@@ -14,7 +14,7 @@ import scipy.sparse as sp
 import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from harness.solving.session import answer_of
+from harness.solving.solver_session import answer_of
 from harness.verification.reference import best_of_candidates
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared

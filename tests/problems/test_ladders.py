@@ -13,7 +13,7 @@ from small_problems import problem_in
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from harness.verification.judge import judge
 from harness.verification.reference import best_of_candidates
 from harness.verification.reference_problem import ReferenceProblem, measurable

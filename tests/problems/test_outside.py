@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from sample_size import ASKED
 from synthetic_results import row, write_rows
 
-from harness.solving.session import answer_of
+from harness.solving.solver_session import answer_of
 from harness.verification.judge import Reference, judge
 from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from small_problems import problem_in
 
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.scene_files import SCENES, Scene, read_scene, scene_names

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from argyris_plates import Array, deflections, held
 from sample_size import ASKED
 
-from harness.solving.session import answer_of
+from harness.solving.solver_session import answer_of
 from problems.build import load_case, prepared
 from problems.model.joint import Joint
 from problems.model.scene import JointScene

@@ -10,7 +10,7 @@ import pytest
 from exact_answer import is_exact
 from synthetic_results import no_answer, results, row, shown, table
 
-from harness.solving.session import answer_of
+from harness.solving.solver_session import answer_of
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from problems.ladders import ladders, make_rung, rung_names, sparse

@@ -108,7 +108,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "np.minimum(reach, self.compliance)",
         ),
         "s.error + SAFE * rounding), z": ("s.error), z", "SAFE * rounding), z"),
-        "distance = units.energy(z) / 2": ("distance = units.energy(z) / 4", "pass"),
+        "distance = units.energy_norm(z) / 2": ("distance = units.energy_norm(z) / 4", "pass"),
         " + abs(z) / 2)": (")", " + abs(z) / 4)"),
         "abs(s.value) + abs(units.At) @ abs(z)": ("abs(s.value)",),
         " + roundings * ETA * z.any(axis=0)": ("",),
@@ -188,7 +188,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "self.opening - self.error\n": ("self.opening\n",),
         "closing.any() or not": ("not",),
         "closing.any() or not (opening[overlap] > 0).all()": ("closing.any()",),
-        "(theta * self.energy) ** 2 + 2": ("2",),
+        "(theta * self.energy_norm) ** 2 + 2": ("2",),
         "2 * SAFE * gap": ("SAFE * gap / 2", "0 * gap"),
         "(abs(s) + error + theta": ("(error + theta", "(abs(s) + theta"),
         " + theta * (abs(self.opening) + self.error)": ("", " + theta * self.error"),
@@ -251,7 +251,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "reverse=True)[self.allowed]": ("reverse=True)[0]", "reverse=True)[self.allowed + 1]"),
         "round(self.gap_mm, DIGITS), self.plan": ("0.0, self.plan",),
     },
-    "harness/shimming/search.py": {
+    "harness/shimming/shim_search.py": {
         "figures[: len(self.study.masks)], ": ("figures[: len(self.study.masks) - 1], ",),
         "self.limit_mm * max(shares))": ("0.0)",),
         "len(order) - self.allowed]": ("len(order)]",),
@@ -277,9 +277,9 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "2 * first - low": ("low",),
         "max(range(len(regions)), key": ("min(range(len(regions)), key",),
     },
-    "harness/shimming/each.py": {
+    "harness/shimming/joint_shims.py": {
         "count - kept <= most": ("True", "count - kept < most"),
-        "goal.failing(count, ALPHA)": ("goal.failing(count, 2 * ALPHA)",),
+        "goal.allowed_fresh(count, ALPHA)": ("goal.allowed_fresh(count, 2 * ALPHA)",),
         "search.among(self.cases, 0)": ("search.among((0,), 0)",),
     },
     "problems/effects/shims.py": {
@@ -426,10 +426,10 @@ TESTS = {
         "harness/test_staged_random.py",
     ),
     "harness/placement/plan_search.py": ("harness/test_search.py", "harness/test_place.py"),
-    "harness/shimming/search.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
+    "harness/shimming/shim_search.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
     "harness/shimming/study.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
     "harness/shimming/gap_regions.py": ("harness/test_shim.py",),
-    "harness/shimming/each.py": ("harness/test_shim.py",),
+    "harness/shimming/joint_shims.py": ("harness/test_shim.py",),
     "problems/effects/shims.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
     "harness/placement/search.py": ("harness/test_search.py", "harness/test_place.py"),
     "harness/placement/fresh_cases.py": ("harness/test_place.py",),

@@ -18,7 +18,7 @@ from small_problems import problem_in
 from solver_forms import TOLERANCES, promised, promises
 
 from harness import InputError, own_matrices, solve_dual
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from harness.verification.assess import assess
 from harness.verification.judge import Reference, judge
 from harness.verification.proof import Proof

@@ -10,7 +10,7 @@ from sample_size import ASKED
 from small_problems import make_load, make_prepared, problem_in, solve_by_nnls
 from solver_forms import CASES, IN_HOUSE, SLOW, TESTED, TOLERANCES, WRITTEN_HERE
 
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from harness.verification.reference import reference
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector

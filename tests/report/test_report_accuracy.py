@@ -7,7 +7,7 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import HIGH, LOW, answer, no_answer, results, row, shown, sweep, table, write_rows
 
-from report.analysis.standings import best_tolerances, fastest_first, swept, with_errors
+from report.analysis.standings import best_tolerances, cells_of_curves, fastest_first, with_errors
 from report.document.blocks import Figure
 from report.page.run_page_data import run_data
 from report.results.reader import Results
@@ -156,7 +156,7 @@ def test_what_the_reference_leaves_open_is_in_the_solvers_favour(tmp_path: Path)
 def test_settings_must_reach_the_accuracy_on_every_scene(tmp_path: Path) -> None:
     rows = [r for r in sweep() if r["solver"] == "honest"]
     rows += [answer(LOW, "lucky", 7, 0.001, 1e-9), answer(HIGH, "lucky", 7, 0.001, 1e-6)]
-    cells = swept(results(tmp_path, rows))
+    cells = cells_of_curves(results(tmp_path, rows))
     assert fastest_first(cells, accuracy_mm=1e-7)["label"][0] == "honest (dual) 1e-7"
     assert fastest_first(cells, accuracy_mm=1e-5)["label"][0] == "lucky (dual)"
 

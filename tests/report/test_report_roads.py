@@ -9,7 +9,7 @@ from synthetic_results import no_answer, results, row, table
 
 from harness.results import schema
 from problems import forms
-from report.analysis.time_to_solution import roads
+from report.analysis.time_to_solution import stage_seconds
 from report.results.reader import Results
 from report.sections import summary
 from report.sections.time_to_solution import section as from_scene
@@ -40,7 +40,7 @@ def built(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> Results:
 
 
 def lines(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> pd.DataFrame:
-    return roads(built(directory, rows, **facts)).set_index("method")
+    return stage_seconds(built(directory, rows, **facts)).set_index("method")
 
 
 def totals(line: pd.Series) -> list[float]:

@@ -12,7 +12,7 @@ from small_problems import make_load, make_prepared, make_strips, problem_in, so
 from solver_forms import CASES, TESTED
 
 from harness.conformance.check import run
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness

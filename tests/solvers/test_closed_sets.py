@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from small_problems import by_nnls, definite
 
-from harness.solving.session import answer_of
+from harness.solving.solver_session import answer_of
 from harness.verification.reference import proof_of
 from problems.forms import compliance
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase

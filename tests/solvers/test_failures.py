@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from small_problems import make_load, make_prepared, make_strips
 from solver_forms import IN_HOUSE
 
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from problems.forms.assembly import Assembly, DualLoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form

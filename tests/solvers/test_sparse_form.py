@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from small_problems import make_load, make_prepared, make_strips, problem_in, solve_by_nnls
 from sparse_matrices import band_matrix, graph_matrix, symmetric
 
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from harness.verification.reference import best_of_candidates, proof_of, reference
 from harness.verification.reference_problem import last_stage
 from problems.build import load_case, prepared

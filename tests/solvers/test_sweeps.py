@@ -12,7 +12,7 @@ from small_problems import definite, make_load, make_prepared, problem_in, solve
 from strip_scene import write_strip
 
 from harness.conformance.known_problems import contact_rows
-from harness.solving.session import SolverSession
+from harness.solving.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase
 from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse

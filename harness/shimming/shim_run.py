@@ -38,11 +38,11 @@ from problems.reporter import SILENT, Reporter
 from problems.scene_files import scene_of
 from problems.storage import digest
 
-from .each import each_joint
 from .gap_regions import patches_of_gap
-from .outcome import UNITS, as_solved, figures_of, record_of, sentence_of
+from .joint_shims import each_joint
+from .outcome import UNITS, figures_of, record_of, sentence_of, solver_statements
 from .patches import patches_of, stock_of
-from .search import ShimSearch
+from .shim_search import ShimSearch
 from .study import ShimStudy
 
 RECORD = "shim.json"
@@ -170,7 +170,7 @@ def shim(
     ]
     if touching:
         raise InputError(touching)
-    number = 1 if cases.are_one(read) else cases.count or RANDOM
+    number = 1 if cases.is_single(read) else cases.count or RANDOM
     wanted = recorded_form(directory / records.SHIMS, FORMS)
     form = chosen_form(read, FORMS, wanted, number * len(there)).form
     made = cases.of_search(read, form)
@@ -183,12 +183,12 @@ def shim(
     also = "".join(f", {most:g} {unit}" for most, unit in zip(limits, UNITS, strict=True) if most < inf)
     goal = Goal(allow_gap_mm, Goal.share_of(share, made.count), also=also)
     study = ShimStudy(bare, made, form, there, limits, read, 1 + taper)
-    if each and not listed and goal.failing(made.count, ALPHA) < 0:
+    if each and not listed and goal.allowed_fresh(made.count, ALPHA) < 0:
         allowed = f"{made.count} cases cannot show it: take {goal.least(ALPHA / 2)}, or a share of 1"
         raise InputError.one("--share", "share", goal.share, allowed)
-    order = Cases(range(made.count), made.count) if each else Cases.of(made.count, listed, goal)
+    case_numbers = Cases(range(made.count), made.count) if each else Cases.of(made.count, listed, goal)
     if patches is None:
-        gap = PlanSession(study).largest_gap(order.numbers[: order.choosing])
+        gap = PlanSession(study).largest_gap(case_numbers.numbers[: case_numbers.choosing])
         there = patches_of_gap(bare.joint, gap, allow_gap_mm) or there
         study = replace(study, patches=there)
     law = other_gaps(bare, made)
@@ -205,7 +205,7 @@ def shim(
     without = "" if each else text([])  # refused now rather than after the search
     asked |= {"share": goal.share, "stock": list(thicknesses), "each": each, "taper": taper}
     identity = asked | {"patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}"} | study.identity
-    if order.table:
+    if case_numbers.table:
         reporter.say(HELD_BACK)
     with records.locked(directory, records.SHIMS, outputs=OUTPUTS):
         if not each:
@@ -220,7 +220,7 @@ def shim(
                 record |= {"forces": [], "sure": ["Solver: every gap is a proven upper bound", MESH]}
             else:
                 search = ShimSearch(journal, 0, 0, allow_gap_mm, study, thicknesses, reporter=reporter)
-                result = search_in_rounds(search, (), goal, order)
+                result = search_in_rounds(search, (), goal, case_numbers)
                 plan, record = result.best.plan if result.best else (), record_of(result, study)
                 words, passed = sentence_of(result, goal, study)
         from report.writers.shim_report import write  # slow to import: not before the search
@@ -230,7 +230,7 @@ def shim(
         record |= asked | {"said": words, **stamp()}
         if not each:
             records.replace_text(directory / "shimmed.toml", text([study.effect(item) for item in plan]))
-            record |= as_solved(directory / "shimmed.toml", len(plan), allow_gap_mm)
+            record |= solver_statements(directory / "shimmed.toml", len(plan), allow_gap_mm)
         records.replace_object(directory / RECORD, record)
         sizes = {there[int(k)].name: t[0] if len(t) == 1 else tuple(t) for k, *t in plan}
         return Shimming(sizes, passed, words, write(directory))

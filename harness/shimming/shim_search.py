@@ -44,7 +44,10 @@ ALL = inf, inf  # more than any cost
 
 @dataclass
 class ShimSearch(PlanSearch):
-    """stock : the thicknesses, mm, ascending."""
+    """Searches for shims of a stock.
+
+    stock : the thicknesses, mm, ascending.
+    """
 
     item = "shim"
     study: ShimStudy
@@ -100,7 +103,7 @@ class ShimSearch(PlanSearch):
             below = self.cost(grown) if grown else ALL
             walked, keeps = self.strict.walked(start, below, cases)
             for plan in filter(None, (grown, walked if keeps or not grown else ())):
-                steps += (way := self.kept(plan))
+                steps += (way := self.proven_growth(plan))
                 kept += way[-1:] if way[-1].gap_mm <= self.limit_mm else []
             if kept:
                 break
@@ -116,7 +119,7 @@ class ShimSearch(PlanSearch):
         outcomes = self.outcomes(plans, cases, ESTIMATED, ())
         yield min(zip([self.strict.value(one)[0] for one in outcomes], plans, strict=True))[1]
 
-    def kept(self, plan: Plan) -> list[Step]:
+    def proven_growth(self, plan: Plan) -> list[Step]:
         """The plan, proven, and what it grows to, until that keeps the limit or cannot grow."""
         steps = [self.whole(plan, "growth")]
         while (step := steps[-1]).gap_mm > self.limit_mm:

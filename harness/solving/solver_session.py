@@ -227,7 +227,7 @@ def no_answer(name: str, answer: Answer) -> InputError:
     return InputError.one(f"solver {name}", "status", status, NO_ANSWER)
 
 
-def candidates(prepared: Prepared, load: LoadCase) -> Iterator[tuple[str, Vector]]:
+def candidate_forces(prepared: Prepared, load: LoadCase) -> Iterator[tuple[str, Vector]]:
     """Names and λ (m,) N of the in-house methods; each is run when its answer is asked for.
 
     None is run where no contact overlaps.

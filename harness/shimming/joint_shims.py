@@ -12,7 +12,7 @@ from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.reporter import Reporter
 from report.document.numbers import counted, out_of
 
-from .search import ShimSearch
+from .shim_search import ShimSearch
 from .study import ShimStudy
 
 TOGETHER = 20  # joints between two lines of progress
@@ -48,7 +48,7 @@ def each_joint(
         for k, one in enumerate(after)
     ]
     kept, pieces = sum(one.largest[0] <= limit for one in after), sum(len(one.plan) for one in after)
-    most = goal.failing(count, ALPHA)
+    most = goal.allowed_fresh(count, ALPHA)
     if isinstance(study.cases, MeasuredGaps):  # there are no others
         most = floor((1 - goal.share) * count + 1e-9)
     low, high = share_interval(kept, count, method="exact")
