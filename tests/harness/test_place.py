@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy.stats import binom, binomtest
-from small_joints import FASTENERS, GAP, two_parts
+from small_joints import FASTENERS, GAP, INLINE, two_parts
 
 from harness import GapCases, shim, solve
 from harness import place as place_fasteners
@@ -29,13 +29,14 @@ from harness.placement.session import FastenerStudy, Outcome, PlanSession, Quest
 from harness.planning.form_choice import Choice
 from harness.results import series_file
 from harness.results.records import PLANS
+from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
-from problems.load_cases.random_gaps import random_gaps
+from problems.load_cases.random_gaps import RandomGaps, random_gaps
 from problems.reporter import Reporter
-from problems.scene_files import read_scene
+from problems.scene_files import read_scene, scene_of
 
 
 @pytest.fixture(scope="module")
@@ -612,6 +613,20 @@ def test_a_scene_that_was_read_needs_its_file(
         with pytest.raises(InputError, match=r"strip\.toml'?: the scene as it is now"):
             call(changed, tmp_path / "none")
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("text", [INLINE + two_parts(), two_parts() + GAP + FASTENERS])
+def test_a_law_of_gaps_is_written_among_effects_of_any_shape(tmp_path: Path, text: str) -> None:
+    """In place of the scene's own gap."""
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    bare = MovableFasteners.of(read_scene(str(path))).bare
+    law = GapCases(mean=0.3, sd=0.1, correlation_length=100.0, count=1).of_search(bare, "dual")
+    assert isinstance(law, RandomGaps)
+    written = edited(str(path), tmp_path, with_fasteners(((10.0, 20.0),)), MOVED, law)
+    first, second = scene_of(tomllib.loads(written)).effects  # type: ignore[attr-defined]
+    assert (first.kind, first.points) == ("fasteners", ((10.0, 20.0),))
+    assert (second.kind, second.mean, second.random.sd) == ("initial_gap", 0.3, 0.1)
 
 
 def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:

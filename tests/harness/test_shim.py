@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy.stats import beta
-from small_joints import FASTENERS, GAP, two_parts, with_gap
+from small_joints import FASTENERS, GAP, INLINE, two_parts, with_gap
 
 from harness import solve
 from harness.placement.answer_journal import AnswerJournal
@@ -187,6 +187,29 @@ def test_what_could_not_be_read_is_refused_before_the_search(
     assert done.exit_code == 2
     assert "shimmed.toml: joint = 1" in done.output
     assert not (tmp_path / "out" / "shims.jsonl").exists()
+
+
+def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path, tmp_path: Path) -> None:
+    """The scene alone could: an effect has the name that shims have without one."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(strip.read_text().replace('"initial_gap"', '"initial_gap"\nname = "shims"'))
+    read_scene(str(scene))
+    done = shim(scene, tmp_path / "out", "--cases", 2, "--share", 1)
+    assert done.exit_code == 2
+    assert "another name: that of a kind" in " ".join(done.output.split())
+    assert not (tmp_path / "out" / "shims.jsonl").exists()
+
+
+def test_a_scene_whose_effects_are_inline_tables_is_shimmed(tmp_path: Path) -> None:
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene.write_text(INLINE + two_parts())
+    asked = ("--allow-gap", 0.1, "--stock", "0.1,0.2", "--patches", "2x1")
+    done = harness("shim", scene, *asked, "--out", out)
+    assert done.exit_code in (0, 4), done.output
+    kinds = [effect.kind for effect in read_scene(str(out / "shimmed.toml")).effects]  # type: ignore[attr-defined]
+    shims = sum(patch["thickness_mm"] > 0 for patch in record_of(out)["patches"])
+    assert kinds == ["initial_gap", "fasteners", *["shims"] * shims]
+    assert shims
 
 
 def test_the_gap_that_patches_follow_is_found_in_blocks(strip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
