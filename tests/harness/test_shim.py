@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy.stats import beta
-from small_joints import FASTENERS, GAP, INLINE, two_parts, with_gap
+from small_joints import FASTENERS, GAP, INLINE, PART, make_joint, two_parts, with_gap
 
 from harness import solve
 from harness.placement.answer_journal import AnswerJournal
@@ -136,6 +136,21 @@ def test_each_contact_is_in_one_patch(tmp_path: Path) -> None:
         assert [patch.area for patch in patches] == areas
     assert [patch.name for patch in patches] == ["left", "right"]
     assert len(patches_of(joint, None)) == 16
+
+
+def test_a_cell_without_a_contact_is_no_patch(tmp_path: Path) -> None:
+    """Ten cells along nine nodes, in each contact of three parts; an outline of the user's own is refused."""
+    joint = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, length=400.0, width=60.0, nodes=(9, 3))
+    for source in (None, "10x1"):
+        patches = patches_of(joint, source)
+        inside = np.sum([patch.shim.gap(joint) < 0 for patch in patches], axis=0)
+        assert inside.tolist() == [1] * 54
+        assert [patch.name for patch in patches[:9]] == [f"{k} a–b" for k in (1, 2, 3, 4, 5, 7, 8, 9, 10)]
+        assert [patch.name for patch in patches[9:]] == [f"{k} b–c" for k in (1, 2, 3, 4, 5, 7, 8, 9, 10)]
+    csv = tmp_path / "patches.csv"
+    csv.write_text("x_min,x_max,y_min,y_max\n0,90,0,60\n205,235,0,60\n")
+    with pytest.raises(InputError, match=r"line 3, x, y = .* ranges with a node"):
+        patches_of(joint, str(csv))
 
 
 def test_outlines_are_cut_to_any_shape(strip: Path, tmp_path: Path) -> None:
