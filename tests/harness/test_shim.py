@@ -14,7 +14,8 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy.stats import beta
-from small_joints import FASTENERS, GAP, INLINE, PART, make_joint, two_parts, with_gap
+from small_joints import FASTENERS, GAP, INLINE, JOINT, PART, make_joint, two_parts, with_gap
+from superelements import flat, scene_from, write_part
 
 from harness import solve
 from harness.placement.answer_journal import AnswerJournal
@@ -575,6 +576,20 @@ def test_all_shims_get_thinner_together(strip: Path) -> None:
     better = search.better(search.whole(tuple((k, 0.05) for k in range(4))))
     assert better is not None
     assert better.plan == tuple((k, 0.01) for k in range(4))
+
+
+def test_contacts_on_a_line_have_the_areas_of_the_first_face(tmp_path: Path) -> None:
+    """Of two parts that overlap by one row of nodes, 30 mm from the next one."""
+    y, parts = JOINT.nodes[:, 1], []
+    for name, inside in (("lower", y <= 60.0), ("upper", y >= 60.0)):
+        parts.append(write_part(tmp_path, name, 40 * np.eye(inside.sum()), flat(JOINT.nodes[inside])))
+    fasteners = {"kind": "fasteners", "preload": 1.0, "points": [[200.0, 60.0]]}
+    scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.2}, fasteners)
+    cases, patches = Listed((load_case(scene),)), patches_of(scene.joint, "2x1")
+    study = ShimStudy(scene, cases, "dual", patches, (inf, inf), scene)
+    np.testing.assert_allclose(study.areas, [375.0, *[750.0] * 7, 375.0])
+    (outcome,) = PlanSession(study).answer(Question((((0, 0.1),),), (0,)))
+    assert 0 < sum(outcome.further[0][3:6]) < 0.2 * study.areas.sum()
 
 
 def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:
