@@ -110,6 +110,18 @@ def test_an_outcome_is_that_of_its_question_alone(strip: Path, session: PlanSess
     assert in_turn == fresh[::-1]
 
 
+def test_load_cases_of_earlier_questions_are_forgotten(strip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The oldest first, beyond room for two and for their forces, but none of a question; outcomes stay."""
+    session, plan = PlanSession(study_of(strip)), plans_of(strip, 1, 3)
+    contacts = session.last.data.assembly.m
+    monkeypatch.setattr("harness.placement.session.LOADS_BYTES", 8 * (2 * contacts + 2 * 2 * contacts))
+    first = session.answer(Question((plan,), (0, 1, 2)))
+    assert [k for _, k in session.loads] == [0, 1, 2]
+    session.answer(Question((plan,), (3,)))
+    assert [k for _, k in session.loads] == [2, 3]
+    assert session.answer(Question((plan,), (0, 1, 2))) == first
+
+
 def searched(session: PlanSession, limit: float, candidates: Plan, allowed: int = 0) -> Search:
     nodes = session.last.data.assembly.contact_nodes
     assert nodes is not None
