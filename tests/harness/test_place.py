@@ -343,6 +343,16 @@ def test_few_plans_are_all_compared(strip: Path, count: int) -> None:
 
 
 @pytest.mark.usefixtures("no_plan_by_plan")
+@pytest.mark.parametrize("count", [4, 7])
+def test_as_many_fasteners_are_found_as_were_asked_for(strip: Path, count: int) -> None:
+    """Also one less than there are candidates, where the scene has a plan of its own."""
+    candidates = plans_of(strip, 2, 4)
+    search = told(strip, candidates, lambda plan, _: sum(x + y for x, y in set(candidates) - set(plan)))
+    _, best = search.once(candidates[:3], count)
+    assert best.plan == tuple(sorted(sorted(candidates, key=sum)[-count:]))
+
+
+@pytest.mark.usefixtures("no_plan_by_plan")
 def test_exchange_starts_from_uniform_plans_too(strip: Path) -> None:
     """Where only the uniform one of three is good, which no exchange would reach one by one."""
     candidates = plans_of(strip, 1, 9)
