@@ -4,11 +4,12 @@ import json
 import re
 import shutil
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -508,6 +509,28 @@ def test_workers_get_the_rows_of_their_question(
     assert outcomes == [PlanSession(study).answer(question) for question in questions]
     for rows, question in zip(sent, questions, strict=True):
         np.testing.assert_array_equal(rows, gaps[list(question.cases)])
+
+
+@pytest.mark.parametrize("killed", [True, False])
+def test_workers_that_were_killed_are_said(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed: bool
+) -> None:
+    """Each answer so far stays."""
+    study, question = study_of(strip), Question((((20.0, 10.0),),), (0,))
+    ended = CancelledError()
+    if killed:
+        ended = pytest.importorskip("distributed").KilledWorker("answer", SimpleNamespace(address="a"), 3)
+
+    def on_worker(task: Any) -> list[Outcome]:
+        if task[1] != question:
+            raise ended
+        return answer(task)
+
+    monkeypatch.setattr("harness.placement.answer_journal.answer", on_worker)
+    said = "--scheduler: workers = .*run the same command again"
+    with ThreadPoolExecutor(1) as pool, pytest.raises(InputError, match=said):
+        AnswerJournal(study, tmp_path / PLANS, {"a": 1}, (pool, 1))([question, replace(question, cases=(1,))])
+    assert len(AnswerJournal(study, tmp_path / PLANS, {"a": 1}, None).answers) == 1
 
 
 @pytest.mark.slow
