@@ -243,8 +243,15 @@ def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):
         return [*faults, Fault(where, "assembly", "own matrices", "a joint: shims are between its parts")]
-    if not any(isinstance(effect, SpringEffect | Positions) for effect in scene.effects):
+    if not _has_fasteners(scene):
         faults.append(Fault(where, "effect", "no fasteners", "one that presses the parts together"))
+    elif asked["allow_force"] is not None and not _has_fasteners(last_scene(scene)):
+        allowed = f"left out: no fastener acts in the last stage, {scene.stages[-1].name}"
+        faults.append(Fault("--allow-force", "force, N", asked["allow_force"], allowed))
     if not scene.joint.pairs:
         faults.append(Fault(where, "contacts", "none", "a contact that a shim can fill"))
     return faults
+
+
+def _has_fasteners(scene: Any) -> bool:
+    return any(isinstance(effect, SpringEffect | Positions) for effect in scene.effects)
