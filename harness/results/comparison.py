@@ -80,7 +80,8 @@ def measurement(row: Row) -> str:
     """
     tolerance = "auto" if row.get("searched") else f"{row['tolerance']:g}"
     words = [row["scene"], row["solver"], row["form"], row.get("variant"), f"tol={tolerance}"]
-    asked = {"threads": row.get("threads_asked"), "batched": row.get("batched"), "case": row.get("case")}
+    batched = row.get("batched_asked", row.get("batched"))  # rows of older versions lack the first
+    asked = {"threads": row.get("threads_asked"), "batched": batched, "case": row.get("case")}
     words += [f"{word}={value}" for word, value in asked.items() if value is not None]
     return " ".join(filter(None, words))
 

@@ -141,6 +141,17 @@ def test_the_cases_of_a_series_are_measurements_of_their_own(tmp_path: Path) -> 
     assert "1 worse, 2 alike" in done.stdout
 
 
+def test_a_failure_is_that_of_the_same_load_cases_at_once(tmp_path: Path) -> None:
+    """One that ended before it was known how many were solved; rows of older versions know only that."""
+    before, older = row(case=0, batched_asked=4, batched=4), row(case=0, batched=4)
+    failed = before | no_answer("crashed") | {"batched": None}
+    for k, old in enumerate((before, older)):
+        sides = [write_rows(tmp_path / f"{name}{k}", [one]) for name, one in (("old", old), ("new", failed))]
+        done = compare(*sides)
+        assert "1 measurement: 1 worse" in done.stdout, done.output
+        assert "batched=4" in done.stdout
+
+
 def searched(kept: float, **figures: Any) -> list[dict[str, Any]]:
     """A search that keeps a tolerance, as the next looser one does not suffice."""
     missed = {"verdict": "outside", "displacement_error_mm": 1e-3}
