@@ -17,6 +17,7 @@ from problems.errors import Fault, InputError
 
 from .records import MEASUREMENTS, Row, read
 from .row_validation import MAX_FAULTS, refuse_wrong_kinds
+from .schema import ROUND
 
 #: The fields that a comparison needs.
 NEEDED = ("scene", "solver", "form", "tolerance", "status", "verdict")
@@ -63,12 +64,17 @@ def read_rows(name: str) -> Side:
 def read_side(name: str, key: str | None = None) -> Side:
     """The rows of a directory to compare: none of a round, and none that a trace stopped.
 
-    With a key, only the row of that key, at the tolerance that the key names. Raises InputError.
+    With a key, only the row of that key, at the tolerance that the key names; where there is none, those of
+    the same measurement in no round or in others, as each directory has rounds of its own. Raises InputError.
     """
     rows = read_rows(name).rows
     if key is None:
         return Side(name, [r for r in rows if not r.get("round") and r.get("iteration_limit") is None])
-    if not (rows := [row | {"searched": False} for row in rows if row.get("key") == key]):
+    wanted, keys = key, [str(row.get("key")) for row in rows]
+    if key not in keys:
+        wanted, keys = key.partition(ROUND)[0], [one.partition(ROUND)[0] for one in keys]
+    pairs = zip(rows, keys, strict=True)
+    if not (rows := [row | {"searched": False} for row, one in pairs if one == wanted]):
         raise InputError.one("--key", "key", key, f"the key of a row in {name}")
     return Side(name, rows)
 

@@ -185,6 +185,20 @@ def test_runs_that_a_trace_stopped_are_not_compared(tmp_path: Path) -> None:
     assert (done.exit_code, "1 measurement: 1 alike" in done.stdout) == (0, True)
 
 
+def test_a_row_of_a_round_is_compared_with_that_of_another(tmp_path: Path) -> None:
+    """And with one outside rounds, as `run --key` makes it; the round of the key itself comes first."""
+    key, at = "4386/0052 ipm dual repeat=0", " round=2026-01-0{}T00:00:00+00:00"
+    rows = [row(key=key + at.format(k), round=f"2026-01-0{k}") for k in (1, 2)]
+    bad = rows[1] | {"displacement_error_mm": 9e-8}
+    old = write_rows(tmp_path / "old", [rows[0], bad])
+    for k, other in enumerate((row(key=key), rows[1], row(key=key + at.format(3), round="2026-01-03"))):
+        done = compare(old, write_rows(tmp_path / f"new{k}", [other]), "--key", rows[0]["key"])
+        assert done.exit_code == 0, done.output
+        assert "1 measurement: 1 alike" in done.stdout
+    refused = compare(old, tmp_path / "new0", "--key", key.replace("ipm", "gi"))
+    assert (refused.exit_code, "the key of a row in" in refused.stderr) == (2, True)
+
+
 def test_times_of_other_machines_are_refused_and_accuracy_is_not(tmp_path: Path) -> None:
     old = write_rows(tmp_path / "old", [row()])
     slow = write_rows(tmp_path / "slow", [row(machine="another", solve_s=100.0)])
