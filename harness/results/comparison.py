@@ -8,6 +8,7 @@ bound is the error bound of the reference: below it, a difference says nothing a
 a difference between errors a million times below the limit.
 """
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isclose, log10
@@ -69,7 +70,9 @@ def read_side(name: str, key: str | None = None) -> Side:
     """
     rows = read_rows(name).rows
     if key is None:
-        return Side(name, [r for r in rows if not r.get("round") and r.get("iteration_limit") is None])
+        whole = [row for row in rows if not row.get("round") and row.get("iteration_limit") is None]
+        refuse_other_options(side := Side(name, whole))
+        return side
     wanted, keys = key, [str(row.get("key")) for row in rows]
     if key not in keys:
         wanted, keys = key.partition(ROUND)[0], [one.partition(ROUND)[0] for one in keys]
@@ -77,6 +80,19 @@ def read_side(name: str, key: str | None = None) -> Side:
     if not (rows := [row | {"searched": False} for row, one in pairs if one == wanted]):
         raise InputError.one("--key", "key", key, f"the key of a row in {name}")
     return Side(name, rows)
+
+
+def refuse_other_options(side: Side) -> None:
+    """Raise InputError if rows of one measurement have other options: they are no repeats of each other."""
+    first: dict[str, str] = {}
+    faults: dict[Fault, None] = {}
+    for row in side.rows:
+        name, options = measurement(row), json.dumps(row.get("options") or {}, sort_keys=True)
+        if first.setdefault(name, options) != options:
+            allowed = f"{first[name]}, as in an earlier row of this measurement: these are no repeats"
+            faults[Fault(side.name, f"options of {name}", options, allowed)] = None
+    if faults:
+        raise InputError(list(faults)[:MAX_FAULTS])
 
 
 def measurement(row: Row) -> str:

@@ -9,6 +9,9 @@ from commands import harness
 from synthetic_results import no_answer, row, write_rows
 from typer.testing import Result
 
+from harness.verification.findings import read_baseline
+from problems.errors import InputError
+
 
 def compare(*words: object) -> Result:
     return harness("compare", *words)
@@ -239,6 +242,21 @@ def test_what_cannot_be_compared_is_refused(kind: str, tmp_path: Path) -> None:
     done = compare(old, new)
     assert done.exit_code == code
     assert message in done.stderr
+
+
+def test_rows_of_other_options_are_no_repeats(tmp_path: Path) -> None:
+    """Of one solver under one variant, as after a change of the suite; one of them has its key."""
+    rows = [row(key=f"a {rho}", options={"rho": rho}, repeat=k) for k, rho in enumerate((0.1, 0.2))]
+    both, one = write_rows(tmp_path / "both", rows), write_rows(tmp_path / "one", rows[:1])
+    for sides in ((both, one), (one, both)):
+        done = compare(*sides)
+        assert done.exit_code == 2
+        said = " ".join(done.stderr.split())
+        assert f'{both}: options of 4386/0052 ipm dual tol=1e-09 threads=2 = \'{{"rho": 0.2}}\'' in said
+        assert '{"rho": 0.1}, as in an earlier row' in said
+    assert compare(one, both, "--key", "a 0.1").exit_code == 0
+    with pytest.raises(InputError, match="options of"):
+        read_baseline(one, 10.0, "now", rows)
 
 
 def test_a_directory_without_rows_is_bad_input(tmp_path: Path) -> None:
