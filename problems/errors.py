@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Self, TypeVar
 
 CONTROL = re.compile("[\0-\x1f\x7f]")
 In = TypeVar("In")
@@ -54,6 +54,10 @@ class InputError(ValueError):
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.faults = list(faults)
         super().__init__("\n".join(map(str, self.faults)))
+
+    def __reduce__(self) -> tuple[type[Self], tuple[list[Fault]]]:
+        """From a worker it comes with its faults, not with the text that ValueError was given."""
+        return type(self), (self.faults,)
 
     def in_stage(self, name: str) -> "InputError":
         """The same faults, of a stage; without a name, of a scene that has none."""

@@ -27,12 +27,12 @@ import numpy as np
 import pandas as pd
 from PIL import Image
 
-from harness.planning.plan import ROUND, expand
+from harness.planning.plan import expand
 from harness.planning.suite import read_suite
 from harness.results import records, series_file
 from harness.results.answer_files import pack
 from harness.results.provenance import ROOT, provenance
-from harness.results.schema import OWNERS, VERDICTS
+from harness.results.schema import OWNERS, ROUND, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.terminal import INTERRUPTED
 from report.analysis.standings import of_fastest

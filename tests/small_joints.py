@@ -59,6 +59,14 @@ preload = 40.0
 points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]
 """
 
+#: Both as an array of inline tables, as tomli_w writes short ones; before the table [joint].
+INLINE = """
+effect = [
+    { kind = "initial_gap", mean = 0.2 },
+    { kind = "fasteners", preload = 40.0, points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]] },
+]
+"""
+
 POINTS = "points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]"
 STAGED = f"""
 title = "Tacked, shimmed, riveted, released"

@@ -38,10 +38,12 @@ def merge(names: Sequence[str], out: Path) -> Path:
         raise InputError.one("--out", "directory", str(out), f"has rows: {records.OTHER}")
     with records.locked(out, folders=("scenes",), outputs=("report", SUITE)):
         for folder, side in zip(map(Path, names), sides, strict=True):
-            of_machine = {"machine": side.rows[0].get("machine")}
+            machine = side.rows[0].get("machine")
             for file in sorted(folder.glob("machine*.json")):
                 record_machine(out, records.parsed(file.read_bytes()))
-            records.append(out / PROBLEMS, *(row | of_machine for row in records.read(folder / PROBLEMS)))
+            problems = records.read(folder / PROBLEMS)  # of a merged run each has its machine
+            problems = [row | {"machine": row.get("machine") or machine} for row in problems]
+            records.append(out / PROBLEMS, *problems)
             for file in (*folder.glob("scenes/*.npz"), *folder.glob(SUITE)):
                 shutil.copy(file, out / file.relative_to(folder))
         if older:

@@ -94,8 +94,8 @@ class Settings:
                 new = valid_table(type(effect), effect.model_dump() | changes, PAGE, faults, effect.kind)
             made += [] if new is None else [new]
         for effect in made:
-            others = [other for other in made if other is not effect and not scene.stages]
-            wrong = effect.faults(scene.joint, others)
+            others = [other for other in made if other is not effect]
+            wrong = effect.faults(scene.joint, *(() if scene.stages else (others,)))
             faults += [Fault(PAGE, f"{effect.kind}.{key}", value, allowed) for key, value, allowed in wrong]
         if not faults:
             faults = [Fault(PAGE, *fault) for fault in StagePlan(made, scene.stages, scene.joint).faults()]

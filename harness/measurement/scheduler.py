@@ -7,6 +7,7 @@ worker are done by others; a task that keeps killing workers fails alone. Only t
 import logging
 import platform
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
@@ -180,6 +181,15 @@ def versions() -> dict[str, str]:
     code = fingerprint(file for folder in CODE for file in (ROOT / folder).rglob("*.py"))
     packages = {name: installed_version(name) for name in PACKAGES}
     return {"python": platform.python_version(), **packages, "code": code}
+
+
+def refuse_lost_workers(ended: BaseException) -> None:
+    """Raise InputError if a task ended so because workers did: killed, as for their memory, or cut off."""
+    distributed = sys.modules.get("distributed")  # there if its workers are used
+    if isinstance(ended, CancelledError) or (distributed and isinstance(ended, distributed.KilledWorker)):
+        allowed = "workers that go on: they were killed, as where memory is short, or the scheduler ended. "
+        allowed += "Take fewer, and run the same command again: what was answered is kept"
+        raise InputError.one("--scheduler", "workers", type(ended).__name__, allowed) from ended
 
 
 def done_as_completed(

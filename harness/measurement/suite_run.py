@@ -12,13 +12,13 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.planning.plan import ROUND, Measurement, expand, of_key, round_beside, with_key
+from harness.planning.plan import Measurement, expand, of_key, round_beside, with_key
 from harness.planning.suite import Suite
 from harness.planning.tolerance_search import still_needed, unmeasured
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
-from harness.results.schema import Origin
+from harness.results.schema import ROUND, Origin
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import ConsoleReporter, Display
 from harness.verification.reference_problem import (

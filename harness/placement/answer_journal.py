@@ -8,7 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from harness.measurement.scheduler import done_as_completed
+from harness.measurement.scheduler import done_as_completed, refuse_lost_workers
 from harness.placement.session import Outcome, Question, Study, answer
 from harness.results import records
 from harness.results.records import to_line
@@ -50,6 +50,7 @@ class AnswerJournal:
             tasks = ((text, (self._part(question), question)) for text, question in new.items())
             for text, outcomes in done_as_completed(*self.pool, answer, tasks):
                 if isinstance(outcomes, BaseException):
+                    refuse_lost_workers(outcomes)
                     raise outcomes
                 self._keep(text, new[text], outcomes)
         return [self.answers[text] for text in texts]

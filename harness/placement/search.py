@@ -70,8 +70,9 @@ class Search(PlanSearch):
         elif count is not None and comb(len(self.candidates), count) <= PLANS:
             steps.append(best := self.best_of_all(best, count))
         elif count is not None:
-            steps += islice(self.removal(best, values), len(best.plan) - count - 1)
-            steps.append(best := self.fewer(steps[-1], values, every=count <= FEW)[0])
+            way = [best, *islice(self.removal(best, values), len(best.plan) - count - 1)]
+            steps += way[1:]
+            steps.append(best := self.fewer(way[-1], values, every=count <= FEW)[0])
         return [*steps, *self.wholes(self.even(len(best.plan)), "uniform")], best
 
     def even(self, count: int) -> list[Plan]:

@@ -44,6 +44,7 @@ from solvers.algorithms.newton_sweeps import Case
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
 ENOUGH_MM = LIMIT_MM / 2  # a bound that needs no further refinement
 THREADS = 1  # of linear algebra: two workers gain more than two threads
+LOADS_BYTES = 2**29  # of load cases kept for other questions
 POWER = 8  # of the mean of gaps that stands for the largest one where that does not change
 
 
@@ -321,6 +322,7 @@ class PlanSession:
             of_stage = StageCases(self.cases, stage)
             made = session.data.with_p([of_stage.load(k) for k in new])
             self.loads |= {(stage, k): load for k, load in zip(new, made, strict=True)}
+            self._forget(set(numbers))
         locking, overlap = stage.locking(K, approaches), np.zeros((K.m, approaches.shape[1]))
         if stage.springs:
             overlap = session.springs(stage.springs.T)[1] @ (stage.springs.k[:, None] * approaches)
@@ -334,6 +336,16 @@ class PlanSession:
                 load = self.loads[stage, k]
                 loads.append(DualLoadCase(load.f + f + of_springs, load.g + g, load.p + (u + p)))
         return session, loads
+
+    def _forget(self, needed: set[int]) -> None:
+        """Drop load cases beyond LOADS_BYTES, the oldest first, but none of these numbers."""
+        counted, size = set[int](), 0  # cases may share f
+        for (stage, k), load in [*reversed(self.loads.items())]:
+            new = [array for array in (load.f, load.g, load.p) if id(array) not in counted]
+            counted.update(map(id, new))
+            size += sum(array.nbytes for array in new)
+            if size > LOADS_BYTES and k not in needed:
+                del self.loads[stage, k]
 
 
 _sessions: dict[str, PlanSession] = {}  # the only one of this process, so that it opens the assembly once

@@ -12,6 +12,7 @@ from itertools import product
 from math import inf
 from typing import Any
 
+from harness.results.schema import ROUND
 from problems.errors import Fault, InputError, read_all
 from problems.model.scene import Scene
 from problems.scene_files import read_scene
@@ -23,7 +24,6 @@ from .suite import RandomCases, SolverEntry, Suite
 HALF_DECADES = [float(text) for k in range(3, 17) for text in (f"1e-{k}", f"3e-{k + 1}")][:-1]
 MOST_REPEATS = 5  # of "auto"
 ROUND_REPEATS = 3  # at most, of what is measured in a round
-ROUND = " round="  # before the time, in the keys of a round
 #: Numbers of iterations after which a trace stops a solver.
 ITERATION_LIMITS = [2**k for k in range(20)]
 BEST = 1.0

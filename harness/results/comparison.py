@@ -8,6 +8,7 @@ bound is the error bound of the reference: below it, a difference says nothing a
 a difference between errors a million times below the limit.
 """
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isclose, log10
@@ -17,6 +18,7 @@ from problems.errors import Fault, InputError
 
 from .records import MEASUREMENTS, Row, read
 from .row_validation import MAX_FAULTS, refuse_wrong_kinds
+from .schema import ROUND
 
 #: The fields that a comparison needs.
 NEEDED = ("scene", "solver", "form", "tolerance", "status", "verdict")
@@ -63,14 +65,34 @@ def read_rows(name: str) -> Side:
 def read_side(name: str, key: str | None = None) -> Side:
     """The rows of a directory to compare: none of a round, and none that a trace stopped.
 
-    With a key, only the row of that key, at the tolerance that the key names. Raises InputError.
+    With a key, only the row of that key, at the tolerance that the key names; where there is none, those of
+    the same measurement in no round or in others, as each directory has rounds of its own. Raises InputError.
     """
     rows = read_rows(name).rows
     if key is None:
-        return Side(name, [r for r in rows if not r.get("round") and r.get("iteration_limit") is None])
-    if not (rows := [row | {"searched": False} for row in rows if row.get("key") == key]):
+        whole = [row for row in rows if not row.get("round") and row.get("iteration_limit") is None]
+        refuse_other_options(side := Side(name, whole))
+        return side
+    wanted, keys = key, [str(row.get("key")) for row in rows]
+    if key not in keys:
+        wanted, keys = key.partition(ROUND)[0], [one.partition(ROUND)[0] for one in keys]
+    pairs = zip(rows, keys, strict=True)
+    if not (rows := [row | {"searched": False} for row, one in pairs if one == wanted]):
         raise InputError.one("--key", "key", key, f"the key of a row in {name}")
     return Side(name, rows)
+
+
+def refuse_other_options(side: Side) -> None:
+    """Raise InputError if rows of one measurement have other options: they are no repeats of each other."""
+    first: dict[str, str] = {}
+    faults: dict[Fault, None] = {}
+    for row in side.rows:
+        name, options = measurement(row), json.dumps(row.get("options") or {}, sort_keys=True)
+        if first.setdefault(name, options) != options:
+            allowed = f"{first[name]}, as in an earlier row of this measurement: these are no repeats"
+            faults[Fault(side.name, f"options of {name}", options, allowed)] = None
+    if faults:
+        raise InputError(list(faults)[:MAX_FAULTS])
 
 
 def measurement(row: Row) -> str:
@@ -80,7 +102,8 @@ def measurement(row: Row) -> str:
     """
     tolerance = "auto" if row.get("searched") else f"{row['tolerance']:g}"
     words = [row["scene"], row["solver"], row["form"], row.get("variant"), f"tol={tolerance}"]
-    asked = {"threads": row.get("threads_asked"), "batched": row.get("batched"), "case": row.get("case")}
+    batched = row.get("batched_asked", row.get("batched"))  # rows of older versions lack the first
+    asked = {"threads": row.get("threads_asked"), "batched": batched, "case": row.get("case")}
     words += [f"{word}={value}" for word, value in asked.items() if value is not None]
     return " ".join(filter(None, words))
 

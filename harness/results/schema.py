@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from types import NoneType
 from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 
+#: In the key of a row that was measured in a round, before the time when that began.
+ROUND = " round="
+
 #: The file of a series, see series_file.py.
 SERIES = "series.sqlite"
 

@@ -116,11 +116,14 @@ def with_gaps(cases: RandomGaps) -> Callable[[Any], None]:
     def change(document: Any) -> None:
         for old in of_kind(document, "initial_gap"):
             document["effect"].remove(old)
-        new = tomlkit.table()
-        new.update({"kind": kind} | table)
-        document["effect"].append(new)
+        add_effect(document, {"kind": kind} | table)
 
     return change
+
+
+def add_effect(document: Any, table: dict[str, Any]) -> None:
+    """Append an effect to those of a scene, as [[effect]] or as an inline table, whichever they are."""
+    document.setdefault("effect", tomlkit.aot()).append(table)  # which makes the item that fits
 
 
 def of_kind(document: Any, kind: str) -> list[Any]:

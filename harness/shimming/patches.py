@@ -98,8 +98,8 @@ def corners_of(west: float, east: float, south: float, north: float) -> tuple[Pl
 def checked_patches(
     joint: AnyJoint, shapes: Sequence[Shape], pairs: Iterable[Pair], source: str = "--patches"
 ) -> tuple[Patch, ...]:
-    """A patch for each shape in each pair. Raises InputError if an outline is none, off the junction, without
-    a contact, or overlaps another.
+    """A patch for each shape in each pair; none for a cell, which is in no file, without a contact. Raises
+    InputError if an outline is none, off the junction, without a contact, or overlaps another.
     """
     low, high = joint.bounds[0] - NEAR, joint.bounds[1] + NEAR
     faults = [Fault(source, at, outline, SHAPE) for _, outline, at in shapes if len(outline) < 3]
@@ -109,12 +109,15 @@ def checked_patches(
         off = [place for place in outline if (place < low).any() or (place > high).any()]
         faults += [Fault(source, at, place, on_junction(joint)) for place in off[:1]]
     patches, sound = [], [shape for shape in shapes if len(shape[1]) >= 3]
-    for pair, (name, outline, at) in product(pairs, sound):
+    sheets = [Shims(kind="shims", thickness=1.0, outline=outline) for _, outline, _ in sound]
+    for pair, ((name, outline, at), sheet) in product(pairs, zip(sound, sheets, strict=True)):
+        if not at and not sheet.covers(joint.places(pair), joint).any():
+            continue
         between, where = (None, "") if len(joint.pairs) == 1 else (pair, f" {'–'.join(pair)}")
-        shim = Shims(kind="shims", thickness=1.0, outline=outline, between=between)
+        shim = sheet.model_copy(update={"between": between})
         patches.append(Patch(f"{name}{where}", outline, shim))
         faults += [Fault(source, f"{at or name}, {f[0]}", *f[1:]) for f in shim.faults(joint)]
-    for k, other in _overlaps([patch.shim for patch in patches[: len(sound)]], joint):
+    for k, other in _overlaps(sheets, joint):
         (name, _, at), (other_name, _, other_at) = sound[k], sound[other]
         allowed = f"apart from other patches: it overlaps {other_at or other_name}"
         faults.append(Fault(source, at or name, name, allowed))

@@ -7,8 +7,6 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-import tomlkit
-
 from harness.measurement.scheduler import workers
 from harness.placement.answer_journal import AnswerJournal, recorded_form
 from harness.placement.candidates import Plan
@@ -19,7 +17,7 @@ from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints, stamp
-from harness.scene.scene_file import edited, file_of
+from harness.scene.scene_file import add_effect, edited, file_of
 from harness.scene.solution import Source, load_scene
 from harness.scene.stress import refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
@@ -196,20 +194,18 @@ def shim(
     def text(shims: list[Shims]) -> str:
         def change(document: Any) -> None:
             for one in shims:
-                table = tomlkit.table()
-                table.update(one.model_dump(mode="json", exclude_none=True))
-                document.setdefault("effect", tomlkit.aot()).append(table)
+                add_effect(document, one.model_dump(mode="json", exclude_none=True))
 
         return edited(file_of(scene, read), directory, change, (), law)
 
-    without = "" if each else text([])  # refused now rather than after the search
+    with_one = "" if each else text([there[0].shim])  # refused now rather than after the search
     asked |= {"share": goal.share, "stock": list(thicknesses), "each": each, "taper": taper}
     identity = asked | {"patches": f"{len(there)}, hash {digest(*map(repr, there))[:8]}"} | study.identity
     if case_numbers.table:
         reporter.say(HELD_BACK)
     with records.locked(directory, records.SHIMS, outputs=OUTPUTS):
         if not each:
-            scene_of(tomllib.loads(without), str(directory / "shimmed.toml"))  # as is refused at the end
+            scene_of(tomllib.loads(with_one), str(directory / "shimmed.toml"))  # as is refused at the end
         pool = workers(scheduler, console_of(reporter)) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
             journal = AnswerJournal(study, directory / records.SHIMS, identity, executor)
@@ -246,8 +242,15 @@ def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):
         return [*faults, Fault(where, "assembly", "own matrices", "a joint: shims are between its parts")]
-    if not any(isinstance(effect, SpringEffect | Positions) for effect in scene.effects):
+    if not _has_fasteners(scene):
         faults.append(Fault(where, "effect", "no fasteners", "one that presses the parts together"))
+    elif asked["allow_force"] is not None and not _has_fasteners(last_scene(scene)):
+        allowed = f"left out: no fastener acts in the last stage, {scene.stages[-1].name}"
+        faults.append(Fault("--allow-force", "force, N", asked["allow_force"], allowed))
     if not scene.joint.pairs:
         faults.append(Fault(where, "contacts", "none", "a contact that a shim can fill"))
     return faults
+
+
+def _has_fasteners(scene: Any) -> bool:
+    return any(isinstance(effect, SpringEffect | Positions) for effect in scene.effects)

@@ -13,7 +13,6 @@ from problems.effects.shims import Shims
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.model.fastener_forces import fastener_forces, force_error_per_mm
 from problems.model.scene import JointScene
-from problems.model.surface import surface_of
 
 from .patches import Patch
 
@@ -71,7 +70,7 @@ class ShimStudy(Study):
     def areas(self) -> Vector:
         """The tributary areas (m,) of the contacts, mm²."""
         joint = self.bare.joint
-        return np.concatenate([surface_of(joint.places(pair)).areas for pair in joint.pairs])
+        return np.concatenate([joint.contact_areas(pair) for pair in joint.pairs])
 
     def further(self, answer: CaseAnswer) -> tuple[float, ...]:
         """The figures of a case, no less than they can be.

@@ -17,7 +17,14 @@ from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
 
-from harness.results.comparison import Side, floor_mm, measurement, read_side, refuse_incomparable
+from harness.results.comparison import (
+    Side,
+    floor_mm,
+    measurement,
+    read_side,
+    refuse_incomparable,
+    refuse_other_options,
+)
 from harness.results.counted_rows import counting
 from harness.results.records import Row, replace_text, to_line
 from harness.terminal.console import legible
@@ -99,8 +106,9 @@ def read_baseline(
     """The baseline for the rows of the directory `name`. Raises InputError; Incomparable if it has none of
     these measurements.
     """
-    side = read_side(str(directory))
-    refuse_incomparable(side, Side(name, list(rows)))
+    side, new = read_side(str(directory)), Side(name, list(rows))
+    refuse_other_options(new)
+    refuse_incomparable(side, new)
     times = slowdowns(side, read_side(name), max_slowdown) if max_slowdown else None
     errors: dict[str, tuple[float, float]] = {}
     for row in counting(side.rows):

@@ -207,7 +207,7 @@ def judged(
     problem: ReferenceProblem | None = None
     opened: tuple[str, str] | None = None
     for row in sorted(rows.values(), key=lambda row: (str(row["source"]), form_family(row["form"]))):
-        if row["answer"] and not is_kept(directory / row["answer"]):
+        if row.get("answer") and not is_kept(directory / row["answer"]):
             missing, limit_mm = Judgement("no_answer"), min(row["limit_mm"], LIMIT_MM)
             yield Finding(row["key"], missing, limit_mm, f"{row['answer']} {UNREADABLE}")
             continue

@@ -80,6 +80,9 @@ class AnyJoint(Protocol):
     def areas(self, part: str) -> Vector:
         """(unknowns of the part,) forces of a pressure of 1 N/mm² along its normals."""
 
+    def contact_areas(self, pair: Pair) -> Vector:
+        """(c,) mm², the tributary areas of a pair's contacts on the first part, in the plane."""
+
     def rigid_motion(self, part: str, pair: Pair, shift: float, slopes: Vector) -> Vector:
         """(c,) how far a part that is shifted and tilted moves along the normals of a pair's contacts, mm.
 

@@ -158,6 +158,9 @@ class Joint(Table):
     def areas(self, part: str) -> Vector:
         return self.surface.areas
 
+    def contact_areas(self, pair: Pair) -> Vector:
+        return self.surface.areas
+
     def unknowns(self, part: str) -> slice:
         """The part's displacements, as a slice of x."""
         index = self.names.index(part)

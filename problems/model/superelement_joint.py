@@ -242,6 +242,9 @@ class SuperelementJoint:
         tilted = self.faces[part].surface.areas / (normals @ self.axes[2])
         return np.asarray(self._own_normals(part).T @ tilted)
 
+    def contact_areas(self, pair: Pair) -> Vector:
+        return self.faces[pair[0]].surface.areas[self.pairings[pair].nodes]
+
     def _own_normals(self, part: str) -> sp.csr_array:
         return self._along(part, sp.eye_array(len(self.faces[part].xyz), format="csr"), self._normals[part])
 

@@ -9,6 +9,9 @@ from commands import harness
 from synthetic_results import no_answer, row, write_rows
 from typer.testing import Result
 
+from harness.verification.findings import read_baseline
+from problems.errors import InputError
+
 
 def compare(*words: object) -> Result:
     return harness("compare", *words)
@@ -141,6 +144,17 @@ def test_the_cases_of_a_series_are_measurements_of_their_own(tmp_path: Path) -> 
     assert "1 worse, 2 alike" in done.stdout
 
 
+def test_a_failure_is_that_of_the_same_load_cases_at_once(tmp_path: Path) -> None:
+    """One that ended before it was known how many were solved; rows of older versions know only that."""
+    before, older = row(case=0, batched_asked=4, batched=4), row(case=0, batched=4)
+    failed = before | no_answer("crashed") | {"batched": None}
+    for k, old in enumerate((before, older)):
+        sides = [write_rows(tmp_path / f"{name}{k}", [one]) for name, one in (("old", old), ("new", failed))]
+        done = compare(*sides)
+        assert "1 measurement: 1 worse" in done.stdout, done.output
+        assert "batched=4" in done.stdout
+
+
 def searched(kept: float, **figures: Any) -> list[dict[str, Any]]:
     """A search that keeps a tolerance, as the next looser one does not suffice."""
     missed = {"verdict": "outside", "displacement_error_mm": 1e-3}
@@ -172,6 +186,20 @@ def test_runs_that_a_trace_stopped_are_not_compared(tmp_path: Path) -> None:
     old, new = (write_rows(tmp_path / name, [row(), *stopped[:k]]) for name, k in (("old", 3), ("new", 2)))
     done = compare(old, new)
     assert (done.exit_code, "1 measurement: 1 alike" in done.stdout) == (0, True)
+
+
+def test_a_row_of_a_round_is_compared_with_that_of_another(tmp_path: Path) -> None:
+    """And with one outside rounds, as `run --key` makes it; the round of the key itself comes first."""
+    key, at = "4386/0052 ipm dual repeat=0", " round=2026-01-0{}T00:00:00+00:00"
+    rows = [row(key=key + at.format(k), round=f"2026-01-0{k}") for k in (1, 2)]
+    bad = rows[1] | {"displacement_error_mm": 9e-8}
+    old = write_rows(tmp_path / "old", [rows[0], bad])
+    for k, other in enumerate((row(key=key), rows[1], row(key=key + at.format(3), round="2026-01-03"))):
+        done = compare(old, write_rows(tmp_path / f"new{k}", [other]), "--key", rows[0]["key"])
+        assert done.exit_code == 0, done.output
+        assert "1 measurement: 1 alike" in done.stdout
+    refused = compare(old, tmp_path / "new0", "--key", key.replace("ipm", "gi"))
+    assert (refused.exit_code, "the key of a row in" in refused.stderr) == (2, True)
 
 
 def test_times_of_other_machines_are_refused_and_accuracy_is_not(tmp_path: Path) -> None:
@@ -214,6 +242,21 @@ def test_what_cannot_be_compared_is_refused(kind: str, tmp_path: Path) -> None:
     done = compare(old, new)
     assert done.exit_code == code
     assert message in done.stderr
+
+
+def test_rows_of_other_options_are_no_repeats(tmp_path: Path) -> None:
+    """Of one solver under one variant, as after a change of the suite; one of them has its key."""
+    rows = [row(key=f"a {rho}", options={"rho": rho}, repeat=k) for k, rho in enumerate((0.1, 0.2))]
+    both, one = write_rows(tmp_path / "both", rows), write_rows(tmp_path / "one", rows[:1])
+    for sides in ((both, one), (one, both)):
+        done = compare(*sides)
+        assert done.exit_code == 2
+        said = " ".join(done.stderr.split())
+        assert f'{both}: options of 4386/0052 ipm dual tol=1e-09 threads=2 = \'{{"rho": 0.2}}\'' in said
+        assert '{"rho": 0.1}, as in an earlier row' in said
+    assert compare(one, both, "--key", "a 0.1").exit_code == 0
+    with pytest.raises(InputError, match="options of"):
+        read_baseline(one, 10.0, "now", rows)
 
 
 def test_a_directory_without_rows_is_bad_input(tmp_path: Path) -> None:

@@ -120,6 +120,20 @@ def test_each_stage_is_that_of_solve(
     assert abs(answer.stages[0].gap - answer.gap).max() > 0.01
 
 
+def test_a_shifted_support_stays_in_a_scene_with_stages(path: Path, tmp_path: Path) -> None:
+    """What stages set is looked at in each of them: a support that none has is still refused."""
+    place = 'part = "a"\npoints = [[100.0, 70.0]]\n'
+    supports = f'[[effect]]\nkind = "supports"\nname = "prop"\n{place}'
+    shift = f'[[effect]]\nkind = "support_shift"\n{place}shift = 0.1\n'
+    (tmp_path / "scene.toml").write_text(staged(path) + supports + shift)
+    scene = scene_of(tmp_path / "scene.toml")
+    settings = Settings.of(scene)
+    assert len(settings.applied(scene)) == len(scene.effects)
+    alone = replace(scene, effects=tuple(e for e in scene.effects if e.kind != "supports"))
+    with pytest.raises(InputError, match="a point of a supports effect of part a"):
+        settings.applied(alone)
+
+
 ANOTHER = """
 [[effect]]
 kind = "fasteners"

@@ -80,6 +80,19 @@ def test_rounds_and_older_versions_stay_with_their_machine(tmp_path: Path) -> No
     assert [part.rounds["solve_s"].tolist() for part in parts] == [[2.0], [1446.0]]
 
 
+def test_a_merged_run_is_merged_with_another(
+    both: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each scene's facts stay with the machine that made them."""
+    monkeypatch.setattr("harness.commands.merged_runs.report", lambda out: out)
+    third = machine(tmp_path / "third", "A third", 3.0)
+    assert harness("merge", *both, "--out", tmp_path / "two").exit_code == 0
+    assert harness("merge", tmp_path / "two", third, "--out", tmp_path / "three").exit_code == 0
+    problems = records.read(tmp_path / "three" / "problems.jsonl")
+    made = [(each["machine"], each["build_s"]["Q"]) for each in problems]
+    assert made == [(FAST, 2.0), (SLOW, 1446.0), ("A third", 3.0)]
+
+
 @pytest.mark.parametrize("name", ["machine.json", "problems.jsonl", "suite.toml"])
 @pytest.mark.parametrize("content", [b"\xff{", b"[1]\n"])
 def test_a_damaged_file_is_named_before_anything_is_written(

@@ -4,11 +4,12 @@ import json
 import re
 import shutil
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy.stats import binom, binomtest
-from small_joints import FASTENERS, GAP, two_parts
+from small_joints import FASTENERS, GAP, INLINE, two_parts
 
 from harness import GapCases, shim, solve
 from harness import place as place_fasteners
@@ -29,13 +30,14 @@ from harness.placement.session import FastenerStudy, Outcome, PlanSession, Quest
 from harness.planning.form_choice import Choice
 from harness.results import series_file
 from harness.results.records import PLANS
+from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.build import load_case
 from problems.errors import InputError
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
-from problems.load_cases.random_gaps import random_gaps
+from problems.load_cases.random_gaps import RandomGaps, random_gaps
 from problems.reporter import Reporter
-from problems.scene_files import read_scene
+from problems.scene_files import read_scene, scene_of
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +109,18 @@ def test_an_outcome_is_that_of_its_question_alone(strip: Path, session: PlanSess
     in_turn = [session.answer(question) for question in questions]
     fresh = [PlanSession(session.study).answer(question) for question in reversed(questions)]
     assert in_turn == fresh[::-1]
+
+
+def test_load_cases_of_earlier_questions_are_forgotten(strip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The oldest first, beyond room for two and for their forces, but none of a question; outcomes stay."""
+    session, plan = PlanSession(study_of(strip)), plans_of(strip, 1, 3)
+    contacts = session.last.data.assembly.m
+    monkeypatch.setattr("harness.placement.session.LOADS_BYTES", 8 * (2 * contacts + 2 * 2 * contacts))
+    first = session.answer(Question((plan,), (0, 1, 2)))
+    assert [k for _, k in session.loads] == [0, 1, 2]
+    session.answer(Question((plan,), (3,)))
+    assert [k for _, k in session.loads] == [2, 3]
+    assert session.answer(Question((plan,), (0, 1, 2))) == first
 
 
 def searched(session: PlanSession, limit: float, candidates: Plan, allowed: int = 0) -> Search:
@@ -330,6 +344,16 @@ def test_few_plans_are_all_compared(strip: Path, count: int) -> None:
 
 
 @pytest.mark.usefixtures("no_plan_by_plan")
+@pytest.mark.parametrize("count", [4, 7])
+def test_as_many_fasteners_are_found_as_were_asked_for(strip: Path, count: int) -> None:
+    """Also one less than there are candidates, where the scene has a plan of its own."""
+    candidates = plans_of(strip, 2, 4)
+    search = told(strip, candidates, lambda plan, _: sum(x + y for x, y in set(candidates) - set(plan)))
+    _, best = search.once(candidates[:3], count)
+    assert best.plan == tuple(sorted(sorted(candidates, key=sum)[-count:]))
+
+
+@pytest.mark.usefixtures("no_plan_by_plan")
 def test_exchange_starts_from_uniform_plans_too(strip: Path) -> None:
     """Where only the uniform one of three is good, which no exchange would reach one by one."""
     candidates = plans_of(strip, 1, 9)
@@ -487,6 +511,28 @@ def test_workers_get_the_rows_of_their_question(
         np.testing.assert_array_equal(rows, gaps[list(question.cases)])
 
 
+@pytest.mark.parametrize("killed", [True, False])
+def test_workers_that_were_killed_are_said(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed: bool
+) -> None:
+    """Each answer so far stays."""
+    study, question = study_of(strip), Question((((20.0, 10.0),),), (0,))
+    ended = CancelledError()
+    if killed:
+        ended = pytest.importorskip("distributed").KilledWorker("answer", SimpleNamespace(address="a"), 3)
+
+    def on_worker(task: Any) -> list[Outcome]:
+        if task[1] != question:
+            raise ended
+        return answer(task)
+
+    monkeypatch.setattr("harness.placement.answer_journal.answer", on_worker)
+    said = "--scheduler: workers = .*run the same command again"
+    with ThreadPoolExecutor(1) as pool, pytest.raises(InputError, match=said):
+        AnswerJournal(study, tmp_path / PLANS, {"a": 1}, (pool, 1))([question, replace(question, cases=(1,))])
+    assert len(AnswerJournal(study, tmp_path / PLANS, {"a": 1}, None).answers) == 1
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_report", "without_pictures")
 def test_workers_find_the_same(strip: Path, tmp_path: Path, whole: tuple[Path, str], cluster: Any) -> None:
@@ -612,6 +658,20 @@ def test_a_scene_that_was_read_needs_its_file(
         with pytest.raises(InputError, match=r"strip\.toml'?: the scene as it is now"):
             call(changed, tmp_path / "none")
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("text", [INLINE + two_parts(), two_parts() + GAP + FASTENERS])
+def test_a_law_of_gaps_is_written_among_effects_of_any_shape(tmp_path: Path, text: str) -> None:
+    """In place of the scene's own gap."""
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    bare = MovableFasteners.of(read_scene(str(path))).bare
+    law = GapCases(mean=0.3, sd=0.1, correlation_length=100.0, count=1).of_search(bare, "dual")
+    assert isinstance(law, RandomGaps)
+    written = edited(str(path), tmp_path, with_fasteners(((10.0, 20.0),)), MOVED, law)
+    first, second = scene_of(tomllib.loads(written)).effects  # type: ignore[attr-defined]
+    assert (first.kind, first.points) == ("fasteners", ((10.0, 20.0),))
+    assert (second.kind, second.mean, second.random.sd) == ("initial_gap", 0.3, 0.1)
 
 
 def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -36,10 +37,11 @@ from harness.measurement.scheduler import (
 from harness.measurement.suite_run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
+from harness.results.comparison import Incomparable
 from harness.series.executors import solve_on_worker
 from harness.series.run import run
 from harness.series.session import Job
-from problems.errors import InputError
+from problems.errors import Fault, InputError
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
@@ -113,6 +115,13 @@ def test_every_task_comes_back_once_and_few_are_handed_out() -> None:
             seen[k] = outcome
     assert isinstance(seen.pop(13), ValueError)
     assert seen == {k: 2 * k for k in range(40) if k != 13}
+
+
+@pytest.mark.parametrize("kind", [InputError, Incomparable])
+def test_an_error_of_input_travels_from_a_worker(kind: type[InputError]) -> None:
+    error = kind([Fault("a.toml", "key", [1.0], "2"), Fault("b.toml", "key", None, "3")])
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), again.faults, str(again)) == (kind, error.faults, str(error))
 
 
 def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,8 @@ import pandas as pd
 import pytest
 from commands import harness
 from scipy.stats import beta
-from small_joints import FASTENERS, GAP, two_parts, with_gap
+from small_joints import FASTENERS, GAP, INLINE, JOINT, PART, make_joint, two_parts, with_gap
+from superelements import flat, scene_from, write_part
 
 from harness import solve
 from harness.placement.answer_journal import AnswerJournal
@@ -138,6 +139,21 @@ def test_each_contact_is_in_one_patch(tmp_path: Path) -> None:
     assert len(patches_of(joint, None)) == 16
 
 
+def test_a_cell_without_a_contact_is_no_patch(tmp_path: Path) -> None:
+    """Ten cells along nine nodes, in each contact of three parts; an outline of the user's own is refused."""
+    joint = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, length=400.0, width=60.0, nodes=(9, 3))
+    for source in (None, "10x1"):
+        patches = patches_of(joint, source)
+        inside = np.sum([patch.shim.gap(joint) < 0 for patch in patches], axis=0)
+        assert inside.tolist() == [1] * 54
+        assert [patch.name for patch in patches[:9]] == [f"{k} a–b" for k in (1, 2, 3, 4, 5, 7, 8, 9, 10)]
+        assert [patch.name for patch in patches[9:]] == [f"{k} b–c" for k in (1, 2, 3, 4, 5, 7, 8, 9, 10)]
+    csv = tmp_path / "patches.csv"
+    csv.write_text("x_min,x_max,y_min,y_max\n0,90,0,60\n205,235,0,60\n")
+    with pytest.raises(InputError, match=r"line 3, x, y = .* ranges with a node"):
+        patches_of(joint, str(csv))
+
+
 def test_outlines_are_cut_to_any_shape(strip: Path, tmp_path: Path) -> None:
     """An L and the rest of a rectangle, whichever way round: the gap of two rectangles, each contact once."""
     joint, csv = read_scene(str(strip)).joint, tmp_path / "outlines.csv"  # type: ignore[attr-defined]
@@ -187,6 +203,29 @@ def test_what_could_not_be_read_is_refused_before_the_search(
     assert done.exit_code == 2
     assert "shimmed.toml: joint = 1" in done.output
     assert not (tmp_path / "out" / "shims.jsonl").exists()
+
+
+def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path, tmp_path: Path) -> None:
+    """The scene alone could: an effect has the name that shims have without one."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(strip.read_text().replace('"initial_gap"', '"initial_gap"\nname = "shims"'))
+    read_scene(str(scene))
+    done = shim(scene, tmp_path / "out", "--cases", 2, "--share", 1)
+    assert done.exit_code == 2
+    assert "another name: that of a kind" in " ".join(done.output.split())
+    assert not (tmp_path / "out" / "shims.jsonl").exists()
+
+
+def test_a_scene_whose_effects_are_inline_tables_is_shimmed(tmp_path: Path) -> None:
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene.write_text(INLINE + two_parts())
+    asked = ("--allow-gap", 0.1, "--stock", "0.1,0.2", "--patches", "2x1")
+    done = harness("shim", scene, *asked, "--out", out)
+    assert done.exit_code in (0, 4), done.output
+    kinds = [effect.kind for effect in read_scene(str(out / "shimmed.toml")).effects]  # type: ignore[attr-defined]
+    shims = sum(patch["thickness_mm"] > 0 for patch in record_of(out)["patches"])
+    assert kinds == ["initial_gap", "fasteners", *["shims"] * shims]
+    assert shims
 
 
 def test_the_gap_that_patches_follow_is_found_in_blocks(strip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -537,6 +576,20 @@ def test_all_shims_get_thinner_together(strip: Path) -> None:
     better = search.better(search.whole(tuple((k, 0.05) for k in range(4))))
     assert better is not None
     assert better.plan == tuple((k, 0.01) for k in range(4))
+
+
+def test_contacts_on_a_line_have_the_areas_of_the_first_face(tmp_path: Path) -> None:
+    """Of two parts that overlap by one row of nodes, 30 mm from the next one."""
+    y, parts = JOINT.nodes[:, 1], []
+    for name, inside in (("lower", y <= 60.0), ("upper", y >= 60.0)):
+        parts.append(write_part(tmp_path, name, 40 * np.eye(inside.sum()), flat(JOINT.nodes[inside])))
+    fasteners = {"kind": "fasteners", "preload": 1.0, "points": [[200.0, 60.0]]}
+    scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.2}, fasteners)
+    cases, patches = Listed((load_case(scene),)), patches_of(scene.joint, "2x1")
+    study = ShimStudy(scene, cases, "dual", patches, (inf, inf), scene)
+    np.testing.assert_allclose(study.areas, [375.0, *[750.0] * 7, 375.0])
+    (outcome,) = PlanSession(study).answer(Question((((0, 0.1),),), (0,)))
+    assert 0 < sum(outcome.further[0][3:6]) < 0.2 * study.areas.sum()
 
 
 def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:

@@ -98,6 +98,19 @@ def test_a_fastener_that_pushes_has_a_force_too(tmp_path: Path, monkeypatch: pyt
     assert outcome.further[0][-2] == pytest.approx(50.0)
 
 
+def test_a_limit_of_force_needs_a_fastener_in_the_last_stage(tmp_path: Path) -> None:
+    """Refused before the work: of tacks that are let go none has a force."""
+    text = STAGED[: STAGED.index('[[effect]]\nkind = "shims"')]
+    stages = '[[stage]]\nname = "tack"\non = ["tacks"]\n[[stage]]\nname = "release"\noff = ["tacks"]\n'
+    (tmp_path / "scene.toml").write_text(text + stages, "utf-8")
+    asked = ("--allow-gap", 0.05, "--stock", "0.02", "--allow-force", 500)
+    done = harness("shim", tmp_path / "scene.toml", *asked, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    said = "--allow-force: force, N = 500.0: left out: no fastener acts in the last stage, release"
+    assert said in " ".join(done.output.split())
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_least_of_all_tapered_plans_is_found(tmp_path: Path) -> None:
     path, stock = tmp_path / "scene.toml", (0.02, 0.05)
     path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS)
