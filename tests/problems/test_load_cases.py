@@ -1,6 +1,7 @@
 """Load cases of a series: random gaps, a table of measured ones, a sweep; and what is said of bad ones."""
 
 import pickle
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +181,34 @@ def test_the_first_gap_of_a_table_that_is_no_number_is_named(
     assert "gaps.npy: case 412, contact 7 = nan: every gap must be a finite number, in mm; 1 more" in said(
         error
     )
+
+
+def test_rows_beyond_the_cases_are_not_read(scene: Scene, data: Prepared, tmp_path: Path) -> None:
+    gaps = np.full((30, data.assembly.m), 0.1)
+    gaps[20, 3] = np.nan
+    np.save(tmp_path / "gaps.npy", gaps)
+    assert measured_gaps(scene, tmp_path / "gaps.npy", 20).count == 20
+    with pytest.raises(InputError, match="case 20, contact 3 = nan"):
+        measured_gaps(scene, tmp_path / "gaps.npy", 21)
+
+
+def test_a_mapped_table_is_never_in_memory_as_a_whole(
+    scene: Scene, data: Prepared, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, gaps = tmp_path / "gaps.npy", np.full((20_000, data.assembly.m), 0.1)
+    np.save(path, gaps)
+    monkeypatch.setattr("problems.load_cases.measured_gaps.AT_ONCE", 2**14)
+    monkeypatch.setattr("problems.load_cases.measured_gaps.outliers", lambda gaps, near: gaps > 1)
+    key = measured_gaps(scene, path).content_key
+    tracemalloc.start()
+    try:
+        assert measured_gaps(scene, path).content_key == key
+        assert tracemalloc.get_traced_memory()[1] < gaps.nbytes / 10
+    finally:
+        tracemalloc.stop()
+    gaps[19_999, 0] = 0.2
+    np.save(path, gaps)
+    assert measured_gaps(scene, path).content_key != key
 
 
 @pytest.mark.parametrize(
