@@ -180,8 +180,11 @@ class Joint(Table):
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         return self.x, self.y
 
-    def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
-        return self.weights(points)
+    def grid_weights(self, points: Matrix, correlation_length: float) -> tuple[Any, Any]:
+        """The bilinear weights, summed over y and over x."""
+        W, (nx, ny) = self.weights(points), self.junction.nodes
+        over_y = sp.kron(np.ones((ny, 1)), sp.eye_array(nx))
+        return W @ over_y, W @ sp.kron(sp.eye_array(ny), np.ones((nx, 1)))
 
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
         return values.ravel()

@@ -266,13 +266,13 @@ class SuperelementJoint:
         low, high = self.bounds
         return lines(low[0], high[0]), lines(low[1], high[1])
 
-    def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
+    def grid_weights(self, points: Matrix, correlation_length: float) -> tuple[Any, Any]:
         """The weights of the cubic splines of `from_grid`."""
         from scipy.interpolate import make_interp_spline
 
         lines = self.grid(correlation_length)
         Wx, Wy = (make_interp_spline(at, np.eye(len(at)))(points[:, k]) for k, at in enumerate(lines))
-        return sp.csr_array((Wy[:, :, None] * Wx[:, None, :]).reshape(len(points), -1))
+        return Wx, Wy
 
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
         from scipy.interpolate import RectBivariateSpline
