@@ -74,7 +74,8 @@ class AnyJoint(Protocol):
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
         """W (k, unknowns of the part): Wu are the part's displacements at points, Wᵀp the nodal forces of
-        forces p there, both along the normal of the part `along`, by default of `part`.
+        forces p there, both along the normal of the part `along`, by default of `part`. Raises InputError if
+        a point is off one of them.
         """
 
     def areas(self, part: str) -> Vector:

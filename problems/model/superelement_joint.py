@@ -32,7 +32,7 @@ from .node_table import listed, outliers
 from .plate import Plate
 from .superelement import Superelement, SuperelementTable
 from .superelement_rows import misfit
-from .surface import surface_of
+from .surface import refuse_off, surface_of
 
 LEVEL = np.cos(np.radians(10.0))
 STEEP = 0.1  # the least cosine between a normal and that of the plane
@@ -233,9 +233,12 @@ class SuperelementJoint:
         return W_n
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
-        normals = self.faces[along or part].surface.weights(points) @ self._normals[along or part]
+        names = dict.fromkeys((part, along or part))
+        refuse_off(points, self.covers(tuple(names), points))
+        W = {name: self.faces[name].surface.weights(points) for name in names}
+        normals = W[along or part] @ self._normals[along or part]
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        return self._along(part, self.faces[part].surface.weights(points), normals)
+        return self._along(part, W[part], normals)
 
     def areas(self, part: str) -> Vector:
         normals = self._normals[part]

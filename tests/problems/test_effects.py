@@ -18,6 +18,7 @@ from problems.effects.part_position import PartPosition
 from problems.effects.pressure import Pressure
 from problems.effects.rigid_tool import RigidTool
 from problems.effects.shims import Shims
+from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.model.effect import ForceEffect, PartEffect, StiffnessEffect
 from problems.model.fastener_forces import fastener_forces
@@ -48,6 +49,11 @@ def test_a_fastener_acts_where_it_is(points: list[tuple[float, float]]) -> None:
     np.testing.assert_allclose(on_a @ fields, 700 * there, rtol=1e-12, atol=700 * 400 * 120 * 2e-12)
     far = (abs(JOINT.nodes[:, None] - at) > (50.0, 30.0)).any(axis=2).all(axis=1)
     assert not on_a[far].any()  # on the nodes of its element alone
+
+
+def test_nothing_acts_beyond_the_junction() -> None:
+    with pytest.raises(InputError, match=r"point = \[400.1, 9.0\]: on the parts"):
+        Fasteners(kind="fasteners", preload=1.0, points=((9.0, 9.0), (400.1, 9.0))).force(JOINT)
 
 
 def test_fasteners_of_many_preloads_are_weighted_once_on_each_part(monkeypatch: pytest.MonkeyPatch) -> None:
