@@ -70,6 +70,13 @@ def write_part(
     return {"name": name, "superelement": str(path), "nodes": str(folder / f"{name}.csv")} | keys
 
 
+def with_bay(folder: Path) -> list[Tables]:
+    """Parts a and b of 100 x 100 mm with a node every 5 mm, but for a bay: 20 < x < 80, y > 20."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 101, 5), np.arange(0.0, 101, 5)))
+    nodes = flat(np.column_stack([x, y])[~((x > 20) & (x < 80) & (y > 20))])
+    return [write_part(folder, name, 40 * np.eye(len(nodes)), nodes) for name in "ab"]
+
+
 def scene_from(parts: list[Tables], *effects: Tables, **joint: Any) -> JointScene:
     scene = scene_of({"joint": {"part": parts} | joint, "effect": list(effects)})
     assert isinstance(scene, JointScene)

@@ -35,9 +35,10 @@ def schema_of(kind: Literal["scene", "suite", "row"]) -> dict[str, Any]:
     schema = {"$schema": DIALECT, **model.model_json_schema(), "additionalProperties": False}
     if kind == "suite":
         schema["required"].remove("name")  # by default the file's
-    for table in (schema["$defs"][effect.__name__] for effect in effects.values() if effect.columns):
+    for effect in (effect for effect in effects.values() if effect.columns):
+        table, in_file = schema["$defs"][effect.__name__], ("points", *effect.more_columns)
         table["properties"] |= FILE
-        table["required"] = [key for key in table["required"] if key != "points"]
+        table["required"] = [key for key in table["required"] if key not in in_file]
     return schema
 
 

@@ -1,5 +1,6 @@
 """Ribs: beams along x over the full length of the part, bonded to the skin."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import scipy.sparse as sp
@@ -7,8 +8,8 @@ from pydantic import Field
 
 from problems.input.bounded_types import Finite, NotNegative, Positive
 from problems.input.scan_points import CLOSE
-from problems.model.effect import StiffnessEffect
-from problems.model.interface import on_part
+from problems.model.effect import Effect, StiffnessEffect
+from problems.model.interface import AnyJoint, on_part
 from problems.model.joint import Faults
 from problems.model.plate import Plate
 
@@ -19,6 +20,13 @@ class Ribs(StiffnessEffect):
     lines: Annotated[tuple[Finite, ...], Field(min_length=1), "mm"]
     I: Annotated[Positive, "mm⁴"]  # noqa: E741
     J: Annotated[NotNegative, "mm⁴"] = 0.0
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
+        ribs = [other for other in others if isinstance(other, Ribs) and other.part == self.part]
+        for k, y in enumerate(self.lines):
+            if any(abs(line - y) <= CLOSE for other in ribs for line in other.lines):
+                yield f"lines[{k}]", y, "a line of its own: other ribs are there, too"
 
     def misfits(self, plate: Plate) -> Faults:
         for k, y in enumerate(self.lines):

@@ -17,6 +17,7 @@ from problems.model.surface_cells import cross
 
 NUDGE = 1e-6  # mm: the places of nodes are rounded; of an outline, to the left and below
 Outline = Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=3, exclude_if=lambda some: not some)]
+AT_ONCE = 2**19  # places times corners
 
 
 class Shims(ContactEffect, GapEffect):
@@ -89,9 +90,13 @@ class Shims(ContactEffect, GapEffect):
             return np.asarray(((low - NUDGE <= places) & (places <= high + NUDGE)).all(axis=1))
         corners, (low, high) = np.array(self.outline), joint.bounds
         edge, at = np.roll(corners, -1, axis=0) - corners, np.clip(places - NUDGE, low + NUDGE, high - NUDGE)
-        above = at[:, None, 1] >= corners[:, 1]
-        right = (cross(edge, at[:, None] - corners) > 0) == (edge[:, 1] > 0)
-        return np.asarray(((above != np.roll(above, -1, axis=1)) & right).sum(axis=1) % 2 == 1)
+        inside = ((corners.min(axis=0) <= at) & (at <= corners.max(axis=0))).all(axis=1)
+        near = np.flatnonzero(inside)
+        for some in np.array_split(near, len(near) * len(corners) // AT_ONCE + 1):
+            above = at[some, 1, None] >= corners[:, 1]
+            right = (cross(edge, at[some, None] - corners) > 0) == (edge[:, 1] > 0)
+            inside[some] = ((above != np.roll(above, -1, axis=1)) & right).sum(axis=1) % 2 == 1
+        return np.asarray(inside)
 
     def along(self, places: Matrix) -> Vector:
         """Where places (k, 2), mm, are on the longer range: 0 at its start, 1 at its stop."""

@@ -215,7 +215,7 @@ def _read(table: Cells, headings: Mapping[str, str], options: TableOptions, read
     for line, cells in table.rows():
         texts = [cells[k] if k < len(cells) else "" for k in columns]
         row = [_plain(text).strip("[](){} ") for text in texts] if below else []
-        if any(row) and all(unit in scale for unit, scale in zip(row, scales, strict=True)):
+        if {*row} - NO_UNIT.keys() and all(unit in scale for unit, scale in zip(row, scales, strict=True)):
             both = zip(units, row, strict=True)
             units = [new if old in ("", new) else f"{old}, {new}" for old, new in both]
             continue

@@ -15,7 +15,7 @@ import numpy as np
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
-from problems.input.tables import AS_NAMED, LENGTHS, Cells, TableOptions, doubt, heading, number
+from problems.input.tables import AS_NAMED, LENGTHS, NO_UNIT, Cells, TableOptions, doubt, heading, number
 
 COUNTS = {"", "case", "name", "index", "row", "no", "no.", "nr", "nr.", "id", "unnamed: 0"}
 PLAUSIBLE = 5  # mm: gaps before riveting are smaller
@@ -66,7 +66,7 @@ def _header(path: Path, rows: list[tuple[int, list[str]]], m: int, labels: Seque
         cells = [cell.lstrip("# ") for cell in _trimmed(rows.pop(0)[1], m)]
         names = cells if len(cells) >= m else []
     units = [cell.strip("[]() ").lower() for cell in rows[0][1]] if names and rows else []
-    if any(units) and LENGTHS.keys() >= {*units}:
+    if {*units} - NO_UNIT.keys() and LENGTHS.keys() >= {*units}:
         del rows[0]
         names = [f"{cell} [{unit}]" for cell, unit in zip(names, units, strict=False)]
     numbers = [int(digits[-1]) for name in names[-m:] if (digits := re.findall(r"\d+", name))]

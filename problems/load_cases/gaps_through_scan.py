@@ -1,7 +1,8 @@
 """Random gaps that pass through a scan: a Gaussian field whose values at points are measured.
 
 Let z ~ N(0, σ²C) on the joint's grid, and let the scan be d = Wz + ε, with W the weights of its points on
-that grid and ε ~ N(0, (νσ)² I). Conditional on d the field is (Chilès, Delfiner, Geostatistics, 2012, 7.3.1)
+that grid and ε ~ N(0, (νσ)² I). Row k of W is Wy_k ⊗ Wx_k, as C is Cy ⊗ Cx, so that neither is ever made.
+Conditional on d the field is (Chilès, Delfiner, Geostatistics, 2012, 7.3.1)
 
     z + CWᵀ (WCWᵀ + ν²I)⁻¹ (d − ε − Wz).
 
@@ -22,9 +23,11 @@ from problems.forms.assembly import Matrix, Vector
 from problems.input.scan_points import crowded, too_small, unlike
 from problems.input.tables import AS_NAMED, TableOptions, read_columns
 from problems.model.interface import AnyJoint, on_junction
+from problems.storage import digest
 
 NOISE = 1e-3  # ν
 MOST = 5000  # points of a scan: WCWᵀ is dense
+_last: dict[str, "Scan"] = {}
 
 
 def read_scan(path: Path, joint: AnyJoint, options: TableOptions = AS_NAMED) -> tuple[Matrix, list[str]]:
@@ -57,11 +60,10 @@ def read_scan(path: Path, joint: AnyJoint, options: TableOptions = AS_NAMED) -> 
 
 @dataclass(frozen=True)
 class Scan:
-    """W (s, N) on the N crossings of the grid, Cx and Cy with C = Cy ⊗ Cx, the Cholesky factor of WCWᵀ + ν²I,
-    and d (s,) mm.
-    """
+    """Wx (s, len(x)), Wy (s, len(y)), Cx and Cy, the Cholesky factor of WCWᵀ + ν²I, and d (s,) mm."""
 
-    W: sp.csr_array
+    Wx: Any
+    Wy: Any
     Cx: Matrix
     Cy: Matrix
     factor: Any
@@ -69,28 +71,33 @@ class Scan:
 
     @classmethod
     def of(cls, joint: AnyJoint, points: Matrix, correlation_length: float) -> "Scan":
-        W = joint.grid_weights(points[:, :2], correlation_length)
-        grid = joint.grid(correlation_length)
-        Lx, Ly = (square_root(lines.tobytes(), correlation_length) for lines in grid)
-        Cx, Cy = Lx @ Lx, Ly @ Ly
-        spread = (W @ _times(Cx, Cy, W[[k]].toarray()) for k in range(len(points)))
-        S = np.array(list(spread)) + NOISE**2 * np.eye(len(points))
-        return cls(W, Cx, Cy, sla.cho_factor((S + S.T) / 2), points[:, 2])
+        """Made once; the last one is kept, as workers are sent joint and points with each block of cases."""
+        key = digest(joint.content, points.tobytes(), correlation_length)
+        if key not in _last:
+            Wx, Wy = joint.grid_weights(points[:, :2], correlation_length)
+            grid = joint.grid(correlation_length)
+            Lx, Ly = (square_root(lines.tobytes(), correlation_length) for lines in grid)
+            Cx, Cy = Lx @ Lx, Ly @ Ly
+            S = Wy @ Cy @ Wy.T
+            S *= Wx @ Cx @ Wx.T
+            S[np.diag_indices(len(S))] += NOISE**2
+            _last.clear()
+            _last[key] = cls(Wx, Wy, Cx, Cy, sla.cho_factor(S, overwrite_a=True), points[:, 2])
+        return _last[key]
 
     def mean_says(self, mean: float) -> str:
         """How far the mean of all cases, m + CWᵀ(WCWᵀ + ν²I)⁻¹(d − m), misses the scan, and its range."""
         y = sla.cho_solve(self.factor, self.gaps - mean)
-        between = mean + _times(self.Cx, self.Cy, self.W.T @ y)
+        between = mean + self._spread(y)
         low, high, missed = between.min(), between.max(), abs(NOISE**2 * y).max()
         return f"misses its points by at most {missed:.1g} mm and is {low:.3g} to {high:.3g} mm"
 
     def through(self, gap: Matrix, sd: float, random: np.random.Generator) -> Matrix:
         """The random gap of a pair on the grid, mm, made to pass through the scan. sd : σ, mm."""
-        missed = self.gaps - NOISE * sd * random.standard_normal(len(self.gaps)) - self.W @ gap.ravel()
-        change = _times(self.Cx, self.Cy, self.W.T @ sla.cho_solve(self.factor, missed))
-        return gap + change.reshape(gap.shape)
+        there = np.asarray((self.Wy * (self.Wx @ gap.T)).sum(axis=1))
+        missed = self.gaps - NOISE * sd * random.standard_normal(len(self.gaps)) - there
+        return gap + self._spread(sla.cho_solve(self.factor, missed))
 
-
-def _times(Cx: Matrix, Cy: Matrix, v: Vector) -> Vector:
-    """(Cy ⊗ Cx) v."""
-    return np.asarray(Cy @ v.reshape(len(Cy), len(Cx)) @ Cx).ravel()
+    def _spread(self, v: Vector) -> Matrix:
+        """CWᵀv (len(y), len(x)) on the grid."""
+        return np.asarray(self.Cy @ (self.Wy.T @ (sp.diags_array(v) @ self.Wx)) @ self.Cx)

@@ -23,6 +23,7 @@ from .gap_tables import read_gaps
 
 MAX_NOTES = 10  # on unusual gaps; further ones are counted
 TABLE_MIB = 2**15
+AT_ONCE = 2**22  # gaps of a table, which may be larger than the memory
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,8 @@ class MeasuredGaps(LoadCases):
 
     @property
     def content_key(self) -> str:
-        return digest("table", self.gaps.shape[1], np.ascontiguousarray(self.gaps[: self.count]).tobytes())
+        rows = [digest(some.tobytes()) for _, some in _blocks(self.gaps[: self.count])]
+        return digest("table", self.gaps.shape[1], rows)
 
     def parameters(self, k: int) -> dict[str, float | str]:
         """The hash of the gaps of case k, which reveals a row that has changed since."""
@@ -93,15 +95,21 @@ def measured_gaps(
         raise InputError.one(path, "shape", gaps.shape, allowed)
     if count is not None and count > len(gaps):
         raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
-    notes = []
+    gaps, notes = gaps[:count], list[str]()
     if options.missing:
         gaps = np.where(np.isin(gaps, options.numbers), np.nan, gaps)
     if options.missing and isinstance(scene, JointScene):
         gaps, lost = _completed(scene.joint, gaps)
         notes = [f"{path}: {lost} missing gaps are taken from the nearest contact of their case"] * bool(lost)
     _refuse_infinite(path, gaps)
-    notes += _unusual(scene, path, gaps[:count])
-    return MeasuredGaps(rest, gaps, len(gaps) if count is None else count, notes=tuple(notes))
+    notes += _unusual(scene, path, gaps)
+    return MeasuredGaps(rest, gaps, len(gaps), notes=tuple(notes))
+
+
+def _blocks(gaps: Matrix) -> Iterator[tuple[int, Matrix]]:
+    """The rows of a table, some at a time, with the number of the first of them."""
+    size = max(AT_ONCE // max(gaps.shape[1], 1), 1)
+    return ((start, gaps[start : start + size]) for start in range(0, len(gaps), size))
 
 
 def _completed(joint: AnyJoint, gaps: Matrix) -> tuple[Matrix, int]:
@@ -126,23 +134,28 @@ def _unusual(scene: Scene, path: Path, gaps: Matrix) -> Iterator[str]:
     if joint:
         beside = [joint.span(pair).start + neighbours(joint.places(pair)) for pair in joint.pairs]
         near = np.concatenate(beside) if len({some.shape[1] for some in beside}) == 1 else None
-    marks = np.array([outliers(np.asarray(case), near) for case in gaps])
-    places = np.argwhere(marks).tolist()
-    for k, contact in places[:MAX_NOTES]:
-        usual = f"{np.median(gaps[k]):.3g} mm, the median of the case"
-        yield f"{path}: case {k}, contact {contact} = {gaps[k, contact]:g} is unusual; usual is {usual}"
-    if len(places) > MAX_NOTES:
-        yield f"{path}: {len(places) - MAX_NOTES} more gaps are unusual"
+    count = 0
+    for k, case in enumerate(map(np.asarray, gaps)):
+        marked = np.flatnonzero(outliers(case, near))
+        for contact in marked[: max(MAX_NOTES - count, 0)]:
+            usual = f"{np.median(case):.3g} mm, the median of the case"
+            yield f"{path}: case {k}, contact {contact} = {case[contact]:g} is unusual; usual is {usual}"
+        count += len(marked)
+    if count > MAX_NOTES:
+        yield f"{path}: {count - MAX_NOTES} more gaps are unusual"
 
 
 def _refuse_infinite(path: Path, gaps: Matrix) -> None:
     """Raises InputError with the first gap that is not finite, and the number of cases that have one."""
-    case, contact = np.nonzero(~np.isfinite(gaps))
-    if len(case):
-        cases, value = len(set(case.tolist())), float(gaps[case[0], contact[0]])
-        more = f"; {cases - 1} more cases have such gaps" if cases > 1 else ""
+    wrong = [
+        start + k for start, some in _blocks(gaps) for k in np.flatnonzero(~np.isfinite(some).all(axis=1))
+    ]
+    if wrong:
+        case = np.asarray(gaps[wrong[0]])
+        contact = np.flatnonzero(~np.isfinite(case))[0]
+        more = f"; {len(wrong) - 1} more cases have such gaps" if len(wrong) > 1 else ""
         allowed = f"every gap must be a finite number, in mm{more}"
-        raise InputError.one(path, f"case {case[0]}, contact {contact[0]}", value, allowed)
+        raise InputError.one(path, f"case {wrong[0]}, contact {contact}", float(case[contact]), allowed)
 
 
 def _read(path: Path, m: int, options: TableOptions, labels: Sequence[int]) -> Matrix:

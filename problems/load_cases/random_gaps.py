@@ -1,7 +1,6 @@
 """Load cases that differ in a random initial gap."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -67,14 +66,15 @@ class RandomGaps(LoadCases):
         assert law.random is not None
         seed, sd = (0, 0.0) if k is None else (self.parameters(k)["gap_seed"], law.random.sd)
         field = law.model_copy(update={"random": law.random.model_copy(update={"seed": seed, "sd": sd})})
-        if self.scan is None:
+        if (scan := self.scan) is None:
             return field.gap(self.joint)
-        scan, random = self.scan, np.random.default_rng((seed, 1))
+        random = np.random.default_rng((seed, 1))
         through = {pair: scan.through(z, sd, random) for pair, z in field.on_grid(self.joint).items()}
         return at_contacts(lambda pair: self.joint.from_grid(pair, through[pair]), list(through), self.joint)
 
-    @cached_property
+    @property
     def scan(self) -> Scan | None:
+        """Not kept here, as it would be sent with each block of cases."""
         if self.points is None:
             return None
         assert self.field.random is not None

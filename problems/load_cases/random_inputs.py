@@ -21,6 +21,7 @@ from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
 from problems.model.effect import SpringEffect
+from problems.model.positions import Positions
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import last_scene
 from problems.model.stages import Acting, StagePlan, of_effect
@@ -29,12 +30,14 @@ from problems.storage import digest
 from . import LoadCases
 from .distributions import distribution, values_at
 from .random_gaps import RandomGaps
-from .sweep import MOST_CASES, Key, allowed_keys, in_order, keys_of
+from .sweep import MOST_CASES, Key, allowed_keys, changed_effects, faults_of, in_order, keys_of, misplaced
 
 LAW = re.compile(r"(?:(each) |([1-9]\d{0,6}) of )?(.*)", re.DOTALL)
 LOCKED = "left out: the stage that sets it locks the approach that it has reached"
 FEW = "N of DISTRIBUTION: it changes K, and a K is kept for each of N values"
 DIVIDED = "left out: its points act or change one by one, not as a pattern"
+#: Where a distribution is tried; a draw that fails between these ends the series with a message.
+TRIED = np.array([0.0, 1.0, *np.arange(1, 8) / 8])
 
 
 @dataclass(frozen=True)
@@ -120,11 +123,16 @@ class RandomInputs(LoadCases):
         return cases.scene, cases
 
     def with_stiffness(self, values: Iterable[Vector]) -> "RandomInputs":
-        """The cases on the scene with the K of these numbers of each of `inputs`, whose loads may differ."""
-        effects = list(self.scene.effects)
-        for one, v in in_order(zip(self.inputs, values, strict=True)):
-            if one.changes_K:
-                effects[one.effect] = one.changed(effects[one.effect], float(v[0]), self.scene.joint)
+        """The cases on the scene with the K of these numbers of each of `inputs`, whose loads may differ.
+
+        Raises InputError if points are off the parts, or where others act.
+        """
+        drawn = zip(self.inputs, values, strict=True)
+        changes = [(one, float(v[0])) for one, v in drawn if one.changes_K]
+        moving = any(one.moves for one, _ in changes)
+        if wrong := faults_of(self.scene, changes, _said(changes)) if moving else []:
+            raise InputError(wrong)
+        effects = changed_effects(self.scene, changes)
         return replace(self, scene=replace(self.scene, effects=tuple(effects)))
 
     def staged(self, scene: JointScene) -> JointScene:
@@ -179,13 +187,28 @@ class RandomInputs(LoadCases):
         return load_case(self.part, self.form, fixed)
 
     def changed(self, values: Iterable[Vector]) -> list[Any]:
-        """The effects that change f or g, with these numbers of each of `inputs`."""
-        pieces, joint = dict(self.pieces), self.part.joint
-        for one, v in in_order(zip(self.inputs, values, strict=True)):
+        """The effects that change f or g, with these numbers of each of `inputs`.
+
+        Raises InputError if points are off the parts, or where others act.
+        """
+        pieces, joint, drawn = dict(self.pieces), self.part.joint, list(zip(self.inputs, values, strict=True))
+        for one, v in in_order(drawn):
             if one.effect in pieces and not one.changes_K:
                 own = pieces[one.effect]
                 pieces[one.effect] = [(k, one.changed(e, one.number(v, k, e), joint)) for k, e in own]
+        if moving := [(one, v) for one, v in drawn if one.moves and one.effect in self.acting]:
+            effects = [*self.fixed, *(self._whole(i, pieces[i]) for i in pieces)]
+            if wrong := list(misplaced(effects, joint, bool(self.scene.stages))):
+                raise InputError([Fault(_said(moving), *fault) for fault in wrong])
         return [effect for some in pieces.values() for _, effect in some]
+
+    def _whole(self, number: int, pieces: list[tuple[list[int], Any]]) -> Any:
+        """The effect of some pieces: one at all of their points."""
+        whole = pieces[0][1] if len(pieces) == 1 else self.acting[number][0]
+        if len(pieces) > 1 and isinstance(whole, Positions):
+            marks = np.concatenate([piece.marks(self.part.joint) for _, piece in pieces])
+            whole = whole.model_copy(update={"points": tuple(map(tuple, marks.tolist())), "pattern": None})
+        return whole
 
     def scene_of(self, k: int, stage: JointScene | None = None) -> JointScene:
         cases = self.of_stage(stage) if stage else self
@@ -238,13 +261,19 @@ def inputs_of(
                 faults.append(Fault(where, "key", name, LOCKED))
             if one.changes_K and not one.levels:
                 faults.append(Fault(where, "distribution", text, FEW))
-            for value in one.at(np.array([0.0, 1.0])).tolist():
-                faults += key.faults(scene, value, f"{where}={text}")
+            tried = (key.faults(scene, value, f"{where}={text}") for value in one.at(TRIED).tolist())
+            faults += next(filter(None, tried), [])
             sources.append(where)
     for one, where in zip(inputs, sources, strict=True):
         if one.path[0] == "pattern" and not one.changes_K and _divided(one, inputs, scene, steps):
             faults.append(Fault(where, "key", one.name, DIVIDED))
     return inputs, faults
+
+
+def _said(drawn: Sequence[tuple[Input, Any]]) -> str:
+    """The values drawn, or the distribution of those that each element has, for messages."""
+    at = (f"={one.text}" if one.elements else f" at {np.ravel(v)[0]:g}" for one, v in drawn)
+    return "random " + ", ".join(f"{one.name}{value}" for (one, _), value in zip(drawn, at, strict=True))
 
 
 def _divided(one: Input, inputs: Sequence[Input], scene: JointScene, steps: Sequence[Acting]) -> bool:

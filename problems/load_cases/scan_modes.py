@@ -37,12 +37,12 @@ VARIANCE = 0.99  # kept, if no share is given
 class ScanModes(LoadCases):
     """Case k is the scene with the mean of the scans and a draw of their modes.
 
-    rest : the scene's forces and its other gaps. scans : (s, m) mm. mean : (m,) mm. modes : (r, m), s_j v_j,
-    mm.
+    rest : the scene's forces and its other gaps. scans : the hash of their gaps. mean : (m,) mm. modes :
+    (r, m), s_j v_j, mm.
     """
 
     rest: LoadCase
-    scans: Matrix
+    scans: str
     mean: Vector
     modes: Matrix
     seed: int
@@ -51,7 +51,7 @@ class ScanModes(LoadCases):
 
     @property
     def key(self) -> str:
-        return digest("scans", self.scans.tobytes(), len(self.modes), self.seed)
+        return digest("scans", self.scans, len(self.modes), self.seed)
 
     def parameters(self, k: int) -> dict[str, Any]:
         """The seed of the draw of case k."""
@@ -100,7 +100,8 @@ def scan_modes(
     share = f"{total[r - 1] / total[-1]:.4g} of their variance" if r else "all: the scans are equal"
     notes.append(f"{kept} {share}; each contact counts alike")
     rest = load_case(scene, form, [effect for effect in scene.effects if not isinstance(effect, InitialGap)])
-    return ScanModes(rest, scans, mean, s[:r, None] * V[:r], seed, count, tuple(notes))
+    modes = s[:r, None] * V[:r]
+    return ScanModes(rest, digest(scans.tobytes()), mean, modes, seed, count, tuple(notes))
 
 
 def gaps_of(

@@ -38,7 +38,8 @@ class Stream(LoadCases):
     """Draws of the gap, and fasteners that come and go.
 
     gaps : the draws, with the forces of all fasteners. single : the scene's fasteners, one by one. made : the
-    forces of the last case, by the number of changes that led to it.
+    forces of the last case, by the number of changes that led to it. picks : the fastener of each change, as
+    far as they are drawn.
     """
 
     scene: JointScene
@@ -46,6 +47,7 @@ class Stream(LoadCases):
     single: tuple[Fasteners, ...]
     form: Form
     made: dict[int, Vector] = field(default_factory=dict, compare=False)
+    picks: list[int] = field(default_factory=list, compare=False)
 
     @classmethod
     def of(cls, scene: JointScene, gaps: RandomGaps, form: Form) -> "Stream":
@@ -83,7 +85,8 @@ class Stream(LoadCases):
 
     def _out(self, changes: int) -> list[int]:
         """The fasteners that are out: an odd number of the first changes picked them."""
-        picked = np.zeros(len(self.single), dtype=int)
-        for t in range(changes):
-            picked[np.random.default_rng((self.gaps.seed, t, 1)).integers(len(picked))] += 1
+        for t in range(len(self.picks), changes):
+            random = np.random.default_rng((self.gaps.seed, t, 1))
+            self.picks.append(int(random.integers(len(self.single))))
+        picked = np.bincount(np.array(self.picks[:changes], dtype=np.intp))
         return np.flatnonzero(picked % 2).tolist()

@@ -2,7 +2,8 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from math import prod
 from typing import Any, TypeVar
 
@@ -14,16 +15,19 @@ from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase
 from problems.input.bounded_types import validation_faults
-from problems.model.effect import SpringEffect, StiffnessEffect
+from problems.model.effect import Effect, SpringEffect, StiffnessEffect
 from problems.model.interface import AnyJoint
+from problems.model.joint import Faults
 from problems.model.positions import Positions
 from problems.model.scene import JointScene, Scene
+from problems.model.stages import Plan
 from problems.storage import digest
 
 from . import LoadCases
 
 SYNTAX = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
 MOST, MOST_CASES = 100_000, 10_000_000  # values of a key; combinations
+MAX_FAULTS = 10  # of points, named at once
 NOTHING = "the scene has no number that changes a force or a gap"
 OTHER = "what changes K would be another assembly"
 
@@ -39,8 +43,16 @@ class Key:
     effect: int
     path: tuple[str, ...]
 
+    @property
+    def moves(self) -> bool:
+        """Whether it decides where points are, or how many there are."""
+        return self.path[0] in ("points", "pattern")
+
     def changed(self, effect: Any, value: float, joint: AnyJoint) -> Any:
-        """The effect with this number changed, validated as on reading; stages set the same points."""
+        """The effect with this number changed, validated as on reading; stages set the same points.
+
+        Raises InputError if the effect cannot have it.
+        """
         table = inner = effect.model_dump()
         if self.path[0] == "points":
             shift = [value * (self.path[1] == axis) for axis in "xy"]
@@ -49,16 +61,15 @@ class Key:
             for key in self.path[:-1]:
                 inner = inner[key]
             inner[self.path[-1]] = value
-        return effect.model_copy(update=dict(type(effect).model_validate(table)))
+        try:
+            return effect.model_copy(update=dict(type(effect).model_validate(table)))
+        except ValidationError as error:
+            prefix = self.name.removesuffix(f".{'.'.join(self.path)}")
+            raise InputError(list(validation_faults(self.name, type(effect), error, prefix))) from error
 
     def faults(self, scene: JointScene, value: float, where: str) -> list[Fault]:
         """The faults of this value."""
-        effect = scene.effects[self.effect]
-        try:
-            changed = self.changed(effect, value, scene.joint)
-            return [Fault(where, *fault) for fault in changed.faults(scene.joint)]
-        except ValidationError as error:
-            return list(validation_faults(where, type(effect), error, effect_name(scene, self.effect)))
+        return faults_of(scene, [(self, value)], f"{where} at {value:g}" if self.moves else where)
 
 
 Change = TypeVar("Change", bound=tuple[Key, Any])
@@ -83,15 +94,53 @@ class Sweep(LoadCases):
         return {key.name: values[i] for (key, values), i in zip(self.steps.items(), places, strict=True)}
 
     def load(self, k: int) -> LoadCase:
-        effects = list(self.scene.effects)
-        for key, value in in_order(zip(self.steps, self.parameters(k).values(), strict=True)):
-            effects[key.effect] = key.changed(effects[key.effect], value, self.scene.joint)
-        return load_case(self.scene, self.form, effects)
+        changes = zip(self.steps, self.parameters(k).values(), strict=True)
+        return load_case(self.scene, self.form, changed_effects(self.scene, changes))
 
 
 def in_order(changes: Iterable[Change]) -> list[Change]:
     """The changes, a key and its value each, with shifts of points, which end a pattern, after all others."""
     return sorted(changes, key=lambda change: change[0].path[0] == "points")
+
+
+def changed_effects(scene: JointScene, changes: Iterable[tuple[Key, Any]]) -> list[Effect]:
+    """The effects of a scene with these values of keys. Raises InputError."""
+    effects = list(scene.effects)
+    for key, value in in_order(changes):
+        effects[key.effect] = key.changed(effects[key.effect], value, scene.joint)
+    return effects
+
+
+def faults_of(scene: JointScene, changes: Sequence[tuple[Key, Any]], where: str) -> list[Fault]:
+    """The faults of these values of keys together; those of points also beside the other effects."""
+    try:
+        effects = changed_effects(scene, changes)
+    except InputError as error:
+        return [replace(fault, where=where) for fault in error.faults]
+    numbers = dict.fromkeys(key.effect for key, _ in changes)
+    wrong = [
+        (f"{effect_name(scene, number)}.{key}", value, allowed)
+        for number in numbers
+        for key, value, allowed in effects[number].faults(scene.joint)
+    ]
+    if not wrong and any(key.moves for key, _ in changes):
+        plan = Plan(effects, scene.stages, scene.joint)
+        wrong = list(plan.faults() if scene.stages else misplaced(effects, scene.joint))
+    return [Fault(where, *fault) for fault in wrong]
+
+
+def misplaced(effects: Sequence[Effect], joint: AnyJoint, staged: bool = False) -> Faults:
+    """Yield the faults of effects at points, beside the others that act with them.
+
+    staged : in a stage a fastener may be set where a force presses.
+    """
+    for effect in effects:
+        if isinstance(effect, Positions):
+            springs = staged and isinstance(effect, SpringEffect)
+            others = [one for one in effects if one is not effect]
+            others = [one for one in others if isinstance(one, SpringEffect) or not springs]
+            for key, value, allowed in effect.faults(joint, others):
+                yield f"{effect.kind}.{key}", value, allowed
 
 
 def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
@@ -102,7 +151,7 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
     found = [step for text in texts if (step := _step(scene, text, faults))]
     names, steps = [key.name for key, _ in found], dict(found)
     for key, values in found:
-        for value in values:
+        for value in () if key.moves else values:
             faults += key.faults(scene, value, f"--sweep {key.name}")
     twice = {name for name in names if names.count(name) > 1}
     faults += [Fault("--sweep", name, names, "is swept twice") for name in twice]
@@ -111,6 +160,14 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
     count = prod(map(len, steps.values()))
     if count > MOST_CASES:
         raise InputError.one("--sweep", "cases", count, f"at most {MOST_CASES} combinations")
+    moving = [key for key in steps if key.moves]
+    for values in product(*(steps[key] for key in moving)):
+        at = ", ".join(f"{key.name} at {value:g}" for key, value in zip(moving, values, strict=True))
+        faults += faults_of(scene, list(zip(moving, values, strict=True)), f"--sweep {at}")
+        if len(faults) >= MAX_FAULTS:
+            break
+    if faults:
+        raise InputError(faults)
     whole = [text.partition("=") for text in texts if re.fullmatch(r"[^=]+=-?\d+,\d+", text)]
     notes = tuple(f"--sweep {name} has two values, {two}: decimals have a point" for name, _, two in whole)
     return Sweep(scene, steps, count, form, notes)

@@ -196,6 +196,13 @@ class StiffnessEffect(ElementEffect):
         for first, twin in crowded(np.array(self.held_points)):
             allowed = f"separate places: points[{first}] is there, too"
             yield f"points[{twin}]", list(self.held_points[twin]), allowed
+        count = len(self.held_points)
+        for other in others:
+            if isinstance(other, StiffnessEffect) and other.part == self.part and other.held_points:
+                both = crowded(np.array([*self.held_points, *other.held_points]))
+                for k in (i for i, twin in both if i < count <= twin):
+                    allowed = f"separate places: other {other.kind} are there, too"
+                    yield f"points[{k}]", list(self.held_points[k]), allowed
 
     @abstractmethod
     def stiffness(self, plate: Plate) -> sp.csr_array:

@@ -74,7 +74,8 @@ class AnyJoint(Protocol):
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
         """W (k, unknowns of the part): Wu are the part's displacements at points, Wᵀp the nodal forces of
-        forces p there, both along the normal of the part `along`, by default of `part`.
+        forces p there, both along the normal of the part `along`, by default of `part`. Raises InputError if
+        a point is off one of them.
         """
 
     def areas(self, part: str) -> Vector:
@@ -92,8 +93,10 @@ class AnyJoint(Protocol):
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         """x and y of a grid over the junction on which a random field of that length is drawn."""
 
-    def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
-        """W (k, len(y) len(x)): Wz are the values at points (k, 2), mm, of a field z on that grid."""
+    def grid_weights(self, points: Matrix, correlation_length: float) -> tuple[Any, Any]:
+        """Wx (k, len(x)) and Wy (k, len(y)), sparse or not: a field z (len(y), len(x)) on that grid has the
+        value Σ_ij Wy_ki z_ij Wx_kj at point k of points (k, 2), mm.
+        """
 
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
         """(c,) the values at the contacts of a pair of a field (len(y), len(x)) on that grid."""

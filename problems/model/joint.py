@@ -22,7 +22,7 @@ from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded_types import PLAIN, Name, Positive, with_units
 
 from .plate import Plate
-from .surface import Grid
+from .surface import SAME, Grid, refuse_off
 
 MOST, MOST_NODES = 100_000, 10**7  # mesh lines, nodes; what fits in memory is another question
 NodeCount = Annotated[int, Field(ge=2, le=MOST), PLAIN]
@@ -149,7 +149,8 @@ class Joint(Table):
         return self.surface.weights(points)
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
-        """The weights of the points, as all normals are that of the junction."""
+        """The weights of the points, as all normals are that of the junction. Raises InputError beyond it."""
+        refuse_off(points, Grid(self.x, self.y, same=SAME).covers(points))
         return self.weights(points)
 
     def covers(self, parts: tuple[str, ...], points: Matrix) -> Mask:
@@ -183,8 +184,11 @@ class Joint(Table):
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         return self.x, self.y
 
-    def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
-        return self.weights(points)
+    def grid_weights(self, points: Matrix, correlation_length: float) -> tuple[Any, Any]:
+        """The bilinear weights, summed over y and over x."""
+        W, (nx, ny) = self.weights(points), self.junction.nodes
+        over_y = sp.kron(np.ones((ny, 1)), sp.eye_array(nx))
+        return W @ over_y, W @ sp.kron(sp.eye_array(ny), np.ones((nx, 1)))
 
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
         return values.ravel()

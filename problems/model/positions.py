@@ -117,6 +117,9 @@ class Positions(ContactEffect, ForceEffect):
             return
         for k in np.flatnonzero(~joint.covers(self.parts(joint), marks)):
             yield f"points[{k}]" if self.points else "pattern", marks[k].tolist(), on_junction(joint)
+        if pattern and (twins := crowded(marks)):
+            place = marks[twins[0][1]].tolist()
+            yield "pattern", place, "fewer columns or rows: several of its points are at this node"
         for first, twin in crowded(marks) if self.points and (self.in_holes or self._lines) else ():
             allowed = f"separate places: {self.point_name(first)} is there, too"
             yield f"points[{twin}]", marks[twin].tolist(), allowed

@@ -32,7 +32,7 @@ from .node_table import listed, outliers
 from .plate import Plate
 from .superelement import Superelement, SuperelementTable
 from .superelement_rows import misfit
-from .surface import surface_of
+from .surface import refuse_off, surface_of
 
 LEVEL = np.cos(np.radians(10.0))
 STEEP = 0.1  # the least cosine between a normal and that of the plane
@@ -233,9 +233,12 @@ class SuperelementJoint:
         return W_n
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
-        normals = self.faces[along or part].surface.weights(points) @ self._normals[along or part]
+        names = dict.fromkeys((part, along or part))
+        refuse_off(points, self.covers(tuple(names), points))
+        W = {name: self.faces[name].surface.weights(points) for name in names}
+        normals = W[along or part] @ self._normals[along or part]
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        return self._along(part, self.faces[part].surface.weights(points), normals)
+        return self._along(part, W[part], normals)
 
     def areas(self, part: str) -> Vector:
         normals = self._normals[part]
@@ -269,13 +272,13 @@ class SuperelementJoint:
         low, high = self.bounds
         return lines(low[0], high[0]), lines(low[1], high[1])
 
-    def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
+    def grid_weights(self, points: Matrix, correlation_length: float) -> tuple[Any, Any]:
         """The weights of the cubic splines of `from_grid`."""
         from scipy.interpolate import make_interp_spline
 
         lines = self.grid(correlation_length)
         Wx, Wy = (make_interp_spline(at, np.eye(len(at)))(points[:, k]) for k, at in enumerate(lines))
-        return sp.csr_array((Wy[:, :, None] * Wx[:, None, :]).reshape(len(points), -1))
+        return Wx, Wy
 
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
         from scipy.interpolate import RectBivariateSpline

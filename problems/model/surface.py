@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from problems.errors import InputError
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
 from .surface_cells import cells_of, cross, means, wachspress
@@ -199,6 +200,13 @@ def surface_of(nodes: Matrix) -> Surface:
             number[place] = np.arange(len(place))
             return Grid(x, y, number, SAME, turn)
     return Triangles.of(nodes)
+
+
+def refuse_off(points: Matrix, on: Mask) -> None:
+    """Raises InputError if not all points (k, 2) are on a surface: a force there would act on no node."""
+    if not on.all():
+        place = points[on.argmin()].tolist()
+        raise InputError.one("joint", "point", place, "on the parts, not beyond them or in a bay or a hole")
 
 
 def _weights(values: Vector, rows: Indices, columns: Indices, shape: tuple[int, int]) -> sp.csr_array:

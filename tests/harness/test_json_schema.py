@@ -79,7 +79,12 @@ def test_an_effect_has_its_own_keys_alone(kind: str) -> None:
         assert not isinstance(unit, str) or table["properties"][name]["description"] == unit
     has_file = {"columns", "skip_lines", "missing"} <= table["properties"].keys()
     assert has_file == bool(effect_class(kind).columns)
-    assert "points" not in table["required"] or not has_file
+    in_file = {"points", *effect_class(kind).more_columns}
+    assert not in_file & {*table["required"]} or not has_file
+
+
+def test_a_preload_may_be_a_column_of_the_file() -> None:
+    assert faults(SCENE, {"joint": JOINT, "effect": [{"kind": "fasteners", "file": "holes.csv"}]}) == []
 
 
 def test_a_wrong_suite_and_a_wrong_row_are_refused() -> None:

@@ -141,7 +141,8 @@ def test_each_contact_is_in_one_patch(tmp_path: Path) -> None:
 
 def test_a_cell_without_a_contact_is_no_patch(tmp_path: Path) -> None:
     """Ten cells along nine nodes, in each contact of three parts; an outline of the user's own is refused."""
-    joint = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, length=400.0, width=60.0, nodes=(9, 3))
+    parts = PART, PART | {"name": "b"}, PART | {"name": "c"}
+    joint = make_joint(*parts, length=400.0, width=60.0, nodes=(9, 3))
     for source in (None, "10x1"):
         patches = patches_of(joint, source)
         inside = np.sum([patch.shim.gap(joint) < 0 for patch in patches], axis=0)

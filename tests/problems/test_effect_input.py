@@ -36,7 +36,10 @@ def test_what_the_model_excludes_is_refused_with_its_assumption(tmp_path: Path, 
 
 
 SUPPORTS = 'kind = "supports"\npart = "a"\npoints = [[0.0, 0.0]]'
+ON_NODES = "pattern = { columns = 9, rows = 1, on_nodes = true }"
 ALONE = [
+    (f'kind = "fasteners"\npreload = 1\n{ON_NODES}', "pattern", "fewer columns"),
+    (f'kind = "clamps"\nclamping_force = 1\n{ON_NODES}', "pattern", "fewer columns"),
     ('kind = "shims"\nthickness = -0.1\nx = [0, 9]\ny = [0, 9]', "thickness", "greater than 0; in mm"),
     ('kind = "shims"\nthickness = 0.1\nx = [3, 9]\ny = [0, 9]', "x, y", "at 0, 0 mm"),
     ('kind = "shims"\nthickness = 0.1\nx = [9, 3]\ny = [0, 9]', "x", "start < stop; in mm"),
@@ -115,6 +118,11 @@ CONTRADICTIONS = {
     "a hole twice": [
         'kind = "installed_fasteners"\npoints = [[0, 0]]',
         'kind = "installed_fasteners"\npoints = [[50, 25], [0, 0]]',
+    ],
+    "a support in two tables": [SUPPORTS, SUPPORTS.replace("[[", "[[9, 9], [")],
+    "ribs in two tables": [
+        'kind = "ribs"\npart = "a"\nlines = [20]\nI = 1',
+        'kind = "ribs"\npart = "a"\nlines = [30, 20]\nI = 2',
     ],
     "a support shifted twice": [
         'kind = "support_shift"\npart = "a"\npoints = [[0, 0]]\nshift = 1',

@@ -1,21 +1,25 @@
 """Load cases of a series: random gaps, a table of measured ones, a sweep; and what is said of bad ones."""
 
 import pickle
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
-from small_joints import with_gap
+from small_joints import JOINT, make_scene, with_gap
 from strip_scene import write_strip
+from superelements import scene_from, with_bay
 
 from problems.build import load_case, prepared
+from problems.effects.fasteners import Fasteners
+from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.forms.prepared import Prepared
 from problems.input.tables import TableOptions
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
-from problems.load_cases.sweep import sweep
+from problems.load_cases.sweep import keys_of, sweep
 from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
 
@@ -182,6 +186,34 @@ def test_the_first_gap_of_a_table_that_is_no_number_is_named(
     )
 
 
+def test_rows_beyond_the_cases_are_not_read(scene: Scene, data: Prepared, tmp_path: Path) -> None:
+    gaps = np.full((30, data.assembly.m), 0.1)
+    gaps[20, 3] = np.nan
+    np.save(tmp_path / "gaps.npy", gaps)
+    assert measured_gaps(scene, tmp_path / "gaps.npy", 20).count == 20
+    with pytest.raises(InputError, match="case 20, contact 3 = nan"):
+        measured_gaps(scene, tmp_path / "gaps.npy", 21)
+
+
+def test_a_mapped_table_is_never_in_memory_as_a_whole(
+    scene: Scene, data: Prepared, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, gaps = tmp_path / "gaps.npy", np.full((20_000, data.assembly.m), 0.1)
+    np.save(path, gaps)
+    monkeypatch.setattr("problems.load_cases.measured_gaps.AT_ONCE", 2**14)
+    monkeypatch.setattr("problems.load_cases.measured_gaps.outliers", lambda gaps, near: gaps > 1)
+    key = measured_gaps(scene, path).content_key
+    tracemalloc.start()
+    try:
+        assert measured_gaps(scene, path).content_key == key
+        assert tracemalloc.get_traced_memory()[1] < gaps.nbytes / 10
+    finally:
+        tracemalloc.stop()
+    gaps[19_999, 0] = 0.2
+    np.save(path, gaps)
+    assert measured_gaps(scene, path).content_key != key
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -233,6 +265,41 @@ def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, data: Prepared
 def test_a_bad_sweep(text: str, words: str, scene: Scene, data: Prepared) -> None:
     with pytest.raises(InputError, match=words):
         sweep(scene, [text])
+
+
+def test_points_of_a_sweep_are_checked_in_all_combinations(tmp_path: Path) -> None:
+    """Each key alone is on the part, both are in its bay, or beyond the junction."""
+    own = scene_from(with_bay(tmp_path), {"kind": "fasteners", "preload": 1.0, "points": [[10.0, 10.0]]})
+    one = Fasteners.model_validate(
+        {"kind": "fasteners", "preload": 1.0, "pattern": {"columns": 1, "rows": 1}}
+    )
+    for scene, texts, where, found in (
+        (own, ("points.x=0,40", "points.y=0,60"), "points.x at 40, fasteners.points.y at 60", [50.0, 70.0]),
+        (
+            make_scene(JOINT, one),
+            ("pattern.columns=1,4", "pattern.edge=0,500"),
+            "pattern.columns at 4, fasteners.pattern.edge at 500",
+            500.0,
+        ),
+    ):
+        sweeps = [f"fasteners.{text}" for text in texts]
+        assert [sweep(scene, [text]).count for text in sweeps] == [2, 2]
+        with pytest.raises(InputError) as error:
+            sweep(scene, sweeps)
+        faults = [(fault.where, fault.value) for fault in error.value.faults]
+        assert faults == [(f"--sweep fasteners.{where}", found)]
+
+
+def test_points_of_a_sweep_are_checked_beside_other_effects() -> None:
+    scene = make_scene(
+        JOINT,
+        Fasteners(kind="fasteners", preload=1.0, points=((100.0, 60.0),)),
+        InstalledFasteners(kind="installed_fasteners", points=((150.0, 60.0),)),
+    )
+    assert sweep(scene, ["fasteners.points.x=0:40:5"]).count == 5
+    with pytest.raises(InputError, match=r"--sweep fasteners.points.x at 50: installed_fasteners.points = "):
+        sweep(scene, ["fasteners.points.x=0:50:6"])
+    assert keys_of(scene)["fasteners.points.x"].faults(scene, 50.0, "--find")
 
 
 def test_a_key_swept_twice_and_two_effects_of_a_kind(data: Prepared, tmp_path: Path) -> None:

@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import stats
+from small_joints import JOINT, make_scene
 from strip_scene import STRIP, write_strip
+from superelements import scene_from, with_bay
 
 from harness import validate
 from harness.series.load_case_source import GapCases
 from problems.build import load_case
+from problems.effects.fasteners import Fasteners
+from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.load_cases.random_inputs import RandomInputs
 from problems.load_cases.sweep import sweep
@@ -196,6 +200,36 @@ def test_keys_that_change_the_stiffness_are_refused_only_where_they_are_not_allo
         said.append(str(error.value))
     assert ["another assembly" in text for text in said] == [True, False]
     assert ["ribs.I" in text for text in said] == [False, True]
+
+
+def test_points_are_tried_between_the_ends_of_a_distribution(tmp_path: Path) -> None:
+    """Both ends are on the part; between them is its bay, or an installed fastener."""
+    fastener = {"kind": "fasteners", "preload": 1.0, "points": [[10.0, 60.0]]}
+    with pytest.raises(InputError, match=r"uniform\(0, 80\) at .*: fasteners.points\[0\] = .* not in a bay"):
+        drawn(scene_from(with_bay(tmp_path), fastener), "fasteners.points.x=uniform(0, 80)")
+    near = Fasteners(kind="fasteners", preload=1.0, points=((100.0, 60.0), (90.0, 30.0)))
+    installed = InstalledFasteners(kind="installed_fasteners", points=((150.0, 60.0),))
+    law = "fasteners.points.x={}uniform(0, 100)"
+    with pytest.raises(InputError, match="at 50: installed_fasteners.points = .*separate places"):
+        drawn(make_scene(JOINT, near, installed), law.format(""))
+    assert drawn(make_scene(JOINT, near), law.format("each ")).load(3).f.any()
+
+
+def test_a_draw_off_the_parts_names_keys_and_values(tmp_path: Path) -> None:
+    """Each key alone is on the parts throughout."""
+    fastener = {"kind": "fasteners", "preload": 1.0, "points": [[10.0, 10.0]]}
+    laws = "fasteners.points.x=uniform(0, 40)", "fasteners.points.y=uniform(0, 60)"
+    cases, counts = drawn(scene_from(with_bay(tmp_path), fastener), *laws), [0, 0]
+    for k in range(cases.count):
+        x, y = cases.parameters(k).values()
+        if min(x, y) > 16:  # of its corner, the bay begins at 10, 10
+            counts[0] += 1
+            with pytest.raises(InputError, match=f"random .*points.x at {x:g}, .*y at {y:g}: .* a bay"):
+                cases.load(k)
+        elif min(x, y) < 10:
+            counts[1] += 1
+            assert cases.load(k).f.any()
+    assert min(counts) > 2
 
 
 def test_all_faults_are_told_at_once(scene: Scene) -> None:

@@ -1,15 +1,18 @@
 """Random gaps that pass through a scan, against the conditional Gaussian distribution written out."""
 
+import pickle
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import RectBivariateSpline
 from small_joints import JOINT, make_scene
 from superelements import flat, scene_from, stiffnesses, write_part
 
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
-from problems.load_cases.gaps_through_scan import NOISE
+from problems.load_cases.gaps_through_scan import NOISE, Scan, square_root
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
 
 SD, LENGTH, COUNT = 0.2, 120.0, 4000
@@ -61,6 +64,43 @@ def test_on_superelements_too(tmp_path: Path) -> None:
     gaps = np.array([found.load(k).g for k in range(20)])
     assert abs(gaps[:, [3, 20, 22, 44]] - 0.1 * np.arange(4)).max() < 6 * NOISE * SD
     assert gaps.std(axis=0).max() > SD / 4
+
+
+def test_a_scan_is_made_once_whatever_is_sent_to_workers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    monkeypatch.setattr(
+        "problems.load_cases.gaps_through_scan.square_root",
+        lambda *grid: made.append(grid) or square_root(*grid),
+    )
+    drawn = cases(tmp_path, SCAN + np.array([0.0, 0.0, 0.0123]))
+    drawn.load(0)
+    blocks = [pickle.dumps(drawn) for _ in range(2)]
+    for k, block in enumerate(blocks):
+        np.testing.assert_array_equal(pickle.loads(block).load(k).g, drawn.load(k).g)
+    assert len(made) == 2  # along x and along y
+
+
+def test_no_matrix_has_all_points_and_the_whole_grid(tmp_path: Path) -> None:
+    """A fine grid on superelements, where 100 x 145 x 481 numbers would take 53 MiB."""
+    parts = [
+        write_part(tmp_path, name, K, flat(JOINT.nodes))
+        for name, K in zip("ab", stiffnesses(JOINT), strict=True)
+    ]
+    joint, random = scene_from(parts).joint, np.random.default_rng(2)
+    points = np.column_stack([random.uniform((0, 0), (400, 120), (100, 2)), random.standard_normal(100)])
+    assert [len(lines) for lines in joint.grid(5.0)] == [481, 145]
+    tracemalloc.start()
+    try:
+        scan = Scan.of(joint, points, 5.0)
+        assert tracemalloc.get_traced_memory()[1] < 40 * 2**20
+    finally:
+        tracemalloc.stop()
+    gap = scan.through(random.standard_normal((145, 481)), SD, random)
+    x, y = joint.grid(5.0)
+    at_points = RectBivariateSpline(y, x, gap)(points[:, 1], points[:, 0], grid=False)
+    assert abs(at_points - points[:, 2]).max() < 6 * NOISE * SD
 
 
 def test_the_cases_depend_on_the_scan_and_the_seed_alone(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Random gaps from many scans, against the modes that the scans were made of."""
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,16 @@ def test_a_case_depends_on_the_seed_and_its_number_alone(tmp_path: Path) -> None
     other = scan_modes(SCENE, pattern, 3, 5)
     assert other.key != few.key
     assert not np.array_equal(other.load(2).g, few.load(2).g)
+
+
+def test_workers_are_sent_the_modes_and_not_the_scans(tmp_path: Path) -> None:
+    gaps, pattern = made(tmp_path, 60)
+    cases = scan_modes(SCENE, pattern, 3, 4)
+    sent = pickle.dumps(cases)
+    assert len(sent) < gaps.nbytes / 2
+    assert pickle.loads(sent).key == cases.key
+    write(tmp_path, gaps + 1e-9)
+    assert scan_modes(SCENE, pattern, 3, 4).key != cases.key
 
 
 def test_faults_of_all_scans_at_once(tmp_path: Path) -> None:

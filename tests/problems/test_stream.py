@@ -47,6 +47,15 @@ def test_each_case_is_a_scene_with_some_of_the_fasteners(form: str) -> None:
     assert cases.key != plain.key
 
 
+def test_each_change_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = drawn_cases(scene_of(fasteners(*PLACES)), "dual", fasteners=True, cases=12, seed=4)
+    draw, asked = np.random.default_rng, []
+    monkeypatch.setattr(np.random, "default_rng", lambda seed: asked.append(seed) or draw(seed))
+    for k in range(12):
+        cases.parameters(k)
+    assert asked == [(4, t, 1) for t in range(6)]
+
+
 def test_it_needs_fasteners() -> None:
     with pytest.raises(InputError, match="no fasteners"):
         drawn_cases(scene_of(), "dual", fasteners=True, cases=2, seed=0)

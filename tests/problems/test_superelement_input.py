@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from superelements import Array, Tables, flat, scene_from, solved, write_nodes, write_part
+from superelements import Array, Tables, flat, scene_from, solved, with_bay, write_nodes, write_part
 
 from problems.build import prepared
 from problems.errors import Fault, InputError
@@ -196,10 +196,7 @@ def test_feet_that_change_places(tmp_path: Path) -> None:
 
 
 def test_a_fastener_off_a_part_and_one_in_its_bay(tmp_path: Path) -> None:
-    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 101, 5), np.arange(0.0, 101, 5)))
-    bay = ~((x > 20) & (x < 80) & (y > 20))  # a U
-    nodes = flat(np.column_stack([x, y])[bay])
-    parts = [write_part(tmp_path, name, 40 * np.eye(len(nodes)), nodes) for name in "ab"]
+    parts = with_bay(tmp_path)
     points = [[10.0, 90.0], [50.0, 10.0], [50.0, 60.0], [101.0, 50.0]]
     faults = refused(parts, {"kind": "fasteners", "preload": 1.0, "points": points})
     assert [(fault.key, fault.value) for fault in faults] == [
@@ -208,6 +205,10 @@ def test_a_fastener_off_a_part_and_one_in_its_bay(tmp_path: Path) -> None:
     assert "not in a bay" in faults[0].allowed
     joint = scene_from(parts).joint
     assert joint.areas("a").sum() == pytest.approx(100 * 20 + 2 * 20 * 80, rel=0.06)  # corners are rounded
+    assert joint.deflection("a", np.array(points[:2]), "b").sum() == pytest.approx(2)
+    for place in points[2:]:  # a row of zeros, along a normal that is no number
+        with pytest.raises(InputError, match=f"point = \\{place}: on the parts"):
+            joint.deflection("a", np.array([points[0], place]), "b")
 
 
 @pytest.mark.parametrize(

@@ -64,6 +64,7 @@ def test_the_same_points(name: str, tmp_path: Path) -> None:
         ('x,y,gap,remark\n0,0,1,ok\n1,0,2,"\n2,0,3,"\n', "line 3", "open until line 4"),
         ('x,y,gap,remark\n0,0,1,"left\n1,0,2,\n2,0,3,', "line 2", "open until line 4"),
         ("x,y,gap\n0,0,1 mm\n", "line 2", "a finite number"),
+        ("x,y,gap\n-,-,-\n0,0,1\n", "line 2", "a finite number"),  # no row of units
         *(
             (f"x,y,gap\n0,0,1\n{cell},0,2\n", "line 3", "a finite number")
             for cell in (
@@ -128,6 +129,7 @@ def test_a_header_is_no_case(name: str, index: bool, german: bool, tmp_path: Pat
         (",".join(f"{k}.0" for k in range(9)) + "\n" + ROW, "line 1 .* a header or gaps"),
         (",".join(f"c{k}" for k in (2, 1, 0, 3, 4, 5, 6, 7, 8)) + "\n" + ROW, "0 to 8 in this order"),
         (",".join(["n/a"] * 9) + f"\n{ROW}", "line 1 .* a finite number"),
+        (f"a,b,c,d,e,f,g,h,i\n{','.join('-' * 9)}\n{ROW}", "line 2 .* a finite number"),
         (f"{ROW}\n#N/A{ROW[4:]}", "line 2 .* a finite number"),
         (f"{ROW}\n{','.join(['#N/A'] * 9)}", "line 2 .* a finite number"),
         (";".join(["1.250"] * 9), "line 1 .* may be 1250"),
