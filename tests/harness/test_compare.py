@@ -252,7 +252,7 @@ def test_rows_of_other_options_are_no_repeats(tmp_path: Path) -> None:
         done = compare(*sides)
         assert done.exit_code == 2
         said = " ".join(done.stderr.split())
-        assert f'{both}: options of 4386/0052 ipm dual tol=1e-09 threads=2 = \'{{"rho": 0.2}}\'' in said
+        assert f"{both}: options of 4386/0052 ipm dual tol=1e-09 threads=2 = '{{\"rho\": 0.2}}'" in said
         assert '{"rho": 0.1}, as in an earlier row' in said
     assert compare(one, both, "--key", "a 0.1").exit_code == 0
     with pytest.raises(InputError, match="options of"):

@@ -210,7 +210,7 @@ def test_points_are_tried_between_the_ends_of_a_distribution(tmp_path: Path) -> 
     near = Fasteners(kind="fasteners", preload=1.0, points=((100.0, 60.0), (90.0, 30.0)))
     installed = InstalledFasteners(kind="installed_fasteners", points=((150.0, 60.0),))
     law = "fasteners.points.x={}uniform(0, 100)"
-    with pytest.raises(InputError, match="at 50: installed_fasteners.points = .*separate places"):
+    with pytest.raises(InputError, match=r"at 50: installed_fasteners\.points = .*separate places"):
         drawn(make_scene(JOINT, near, installed), law.format(""))
     assert drawn(make_scene(JOINT, near), law.format("each ")).load(3).f.any()
 
