@@ -1,11 +1,12 @@
 """Finds the value of a scene's key beyond which too few joints keep a gap.
 
 Each value v of an even grid is a series of the same N load cases: case k depends on the seed and k alone. In
-k(v) of them the gap is proven to be within the limit. If one end of the range keeps it in a share s of the
-cases and the other does not, bisection finds neighbours v, v' of the grid with k(v) ≥ sN > k(v').
+k(v) of them the gap is proven to be within the limit, in all but k'(v) ≥ k(v) it is proven to be larger. If
+one end of the range keeps it in a share s of the cases and the other does not, bisection finds neighbours v,
+v' of the grid with k(v) ≥ sN > k(v').
 
 Two more bisections bound the value. One takes for sN the least k whose confidence interval begins at s or
-above, the other the least k whose interval reaches s. If the share is monotone in v, the value lies between
+above, the other the least k' whose interval reaches s. If the share is monotone in v, the value lies between
 their results with 95 % confidence.
 
 Fresh cases, those of the next seed, tell the share at v: if their interval is below s, v moves half-way to
@@ -146,8 +147,8 @@ def tolerance(
     key, grid = keys[name], np.linspace(low, high, ceil(1 / resolution - 1e-9) + 1)
     values = [float(f"{value:.10g}") for value in grid]
 
-    def upper_bounds(value: float, seed: int | None = None) -> Vector:
-        """Bounds on the largest gap in each case at a value (N,) mm, NaN without an answer.
+    def gaps(value: float, seed: int | None = None) -> tuple[Vector, Vector]:
+        """Bounds on the largest gap in each case at a value, below and above, (N,) mm; NaN without an answer.
 
         seed : of fresh cases.
         """
@@ -165,42 +166,44 @@ def tolerance(
         if len(rows) < count:
             raise InputError.one(folder, "cases", len(rows), f"{count}: run the same command again")
         both = [(row.get("max_gap_mm"), row.get("gap_error_mm")) for row in rows]
-        return np.array([nan if gap is None else inf if e is None else gap + e for gap, e in both])
+        gap = np.array([nan if gap is None else gap for gap, _ in both])
+        e = np.array([inf if e is None else e for _, e in both])
+        return gap - e, gap + e
 
-    bounds, shares = cache(upper_bounds), list[dict[str, float]]()
+    bounds, shares = cache(gaps), list[dict[str, float]]()
 
     @cache
-    def kept(value: float, seed: int | None = None) -> int:
-        """In how many cases a value keeps the limit."""
-        largest = bounds(value, seed)
+    def kept(value: float, seed: int | None = None) -> tuple[int, int]:
+        """In how many cases a value keeps the limit, and in how many it may, unknown ones included."""
+        least, largest = bounds(value, seed)
         count, total = int((largest <= allow_gap_mm).sum()), len(largest)
-        missing = int(np.isnan(largest).sum())
-        low, high = share_interval(count, total)
+        missing, most = int(np.isnan(largest).sum()), total - int((least > allow_gap_mm).sum())
+        low, high = share_interval(count, total)[0], share_interval(most, total)[1]
         figures = {"value": value, "cases": total, "kept": count, "share": count / total}
         shares.append(figures | {"low": low, "high": high, "fresh": seed is not None, "no_answer": missing})
         which = "cases" if seed is None else "fresh cases"
         without = f", {missing} without an answer" if missing else ""
         reporter.say(f"{name} = {value:g}: within {allow_gap_mm:g} mm in {count} of {total} {which}{without}")
-        return count
+        return count, most
 
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
     lock = records.locked(directory, TOLERANCE, outputs=OUTPUTS)
     with lock, shared(scheduler, console_of(reporter)) as address:
-        first, last = (bounds(value, None) for value in (values[0], values[-1]))
+        first, last = (bounds(value, None)[1] for value in (values[0], values[-1]))
         if np.array_equal(first, last, equal_nan=True):
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
         outcome, count = searched(kept, values, share, len(first)), len(first)
         limit = f"{allow_gap_mm:g} mm in {100 * share:g} % of the joints"
         said = [outcome.sentences[0].format(key=name, limit=limit)]
-        value, rising = outcome.value, kept(values[0]) < kept(values[-1])
+        value, rising = outcome.value, kept(values[0])[0] < kept(values[-1])[0]
         while value is not None and not cases.gaps:
-            fresh = kept(value, (cases.seed or 0) + 1)
-            least, most = share_interval(fresh, count)
+            fresh, possible = kept(value, (cases.seed or 0) + 1)
+            least, most = share_interval(fresh, count)[0], share_interval(possible, count)[1]
             said.append(
                 f"At {value:g} it is kept in {fresh} of {count} fresh cases, proven: the share of joints is "
                 f"between {least:.2%} and {most:.2%}, with {CONFIDENCE:.0%} confidence."
             )
-            outcome = replace(outcome, value=value, passed=most >= share)
+            outcome = replace(outcome, value=value, passed=share_interval(fresh, count)[1] >= share)
             safe = min(max(outcome.interval[rising], values[0]), values[-1])
             if outcome.passed or value == safe:
                 break
@@ -217,10 +220,12 @@ def tolerance(
     return outcome
 
 
-def searched(kept: Callable[[float], int], values: Sequence[float], share: float, count: int) -> Tolerance:
-    """The outcome by bisection. kept : in how many of the `count` cases a value keeps the limit."""
+def searched(
+    kept: Callable[[float], tuple[int, int]], values: Sequence[float], share: float, count: int
+) -> Tolerance:
+    """The outcome by bisection. kept : in how many of the `count` cases a value keeps the limit, and may."""
     last, least = len(values) - 1, ceil(share * count - 1e-9)
-    ends = kept(values[0]), kept(values[-1])
+    ends = kept(values[0])[0], kept(values[-1])[0]
     rising = ends[0] < least
     if rising == (ends[1] < least):
         which = "Neither end keeps" if rising else "Both ends keep"
@@ -232,16 +237,18 @@ def searched(kept: Callable[[float], int], values: Sequence[float], share: float
         for end in (0, 1)
     )
 
-    def edge(least: int) -> tuple[int, int]:
-        """Neighbours: the first keeps the limit in `least` cases, the second does not or is off the grid."""
+    def edge(least: int, end: int = 0) -> tuple[int, int]:
+        """Neighbours: the first keeps the limit in `least` cases, or may for end = 1; the second does not, or
+        is off the grid.
+        """
         inside, outside = (last + 1, -1) if rising else (-1, last + 1)
         while abs(outside - inside) > 1:
             middle = (inside + outside) // 2
-            inside, outside = (middle, outside) if kept(values[middle]) >= least else (inside, middle)
+            inside, outside = (middle, outside) if kept(values[middle])[end] >= least else (inside, middle)
         return inside, outside
 
     value = values[edge(least)[0]]
-    low, high = sorted((edge(sure)[0], edge(possible)[1]))
+    low, high = sorted((edge(sure)[0], edge(possible, 1)[1]))
     interval = values[low] if low >= 0 else -inf, values[high] if high <= last else inf
     words = f"{interval[0]:g}" if low >= 0 else f"below {values[0]:g}"
     words += f" to {interval[1]:g}" if high <= last else f" to above {values[-1]:g}"

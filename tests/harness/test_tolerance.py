@@ -139,7 +139,7 @@ def test_bisection_finds_the_limit_and_its_interval() -> None:
         kept = np.sort(random.integers(0, count + 1, size))[:: random.choice([-1, 1])]
         by_value = dict(zip(values, kept.tolist(), strict=True))
         asked: list[float] = []
-        outcome = searched(lambda v, a=asked, b=by_value: a.append(v) or b[v], values, share, count)
+        outcome = searched(lambda v, a=asked, b=by_value: a.append(v) or (b[v], b[v]), values, share, count)
         keeps, intervals = kept >= share * count, [share_interval(int(k), count) for k in kept]
         if keeps[0] == keeps[-1]:
             assert outcome.value is None
@@ -180,7 +180,7 @@ def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.usefixtures("without_pictures")
 def test_cases_without_an_answer_are_counted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """In each line, in the outcome and in the table; they keep no limit."""
+    """In each line, in the outcome and in the table; they keep no limit, and are not known to exceed it."""
 
     def rows(folder: Path) -> list[dict[str, float]]:
         value = float(folder.name.removesuffix("-fresh"))
@@ -201,4 +201,7 @@ def test_cases_without_an_answer_are_counted(monkeypatch: pytest.MonkeyPatch, tm
         found.sentences[1]
         == "Without an answer, and counted as too large a gap: 4 of 40 cases over all values."
     )
-    assert pd.read_csv(tmp_path / "out/shares.csv")["no_answer"].tolist() == [1] * 4
+    table = pd.read_csv(tmp_path / "out/shares.csv")
+    assert table["no_answer"].tolist() == [1] * 4
+    low, high = table.loc[table["kept"] == 9, ["low", "high"]].to_numpy().T
+    np.testing.assert_allclose((low, high), (low * 0 + share_interval(9, 10)[0], low * 0 + 1.0), rtol=1e-12)

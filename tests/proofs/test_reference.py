@@ -21,6 +21,7 @@ from harness.verification.judge import Judgement
 from harness.verification.proof import Proof
 from harness.verification.reference import STOPPED, best_of_candidates, reference
 from harness.verification.reference_problem import measurable
+from problems import storage
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase, Vector
@@ -126,8 +127,10 @@ def chosen(made: Prepared, seed: int, closed: float, weak: float) -> tuple[LoadC
     return LoadCase(made.assembly.K.multiply(x) + A @ lam, A.T @ x + opening), x, lam
 
 
-def test_reference_is_computed_once(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reference_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless the problem is another one, or what is in the cache is not what was written."""
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
+    monkeypatch.setattr(storage, "CHECKED", 0)  # as of long files, of which the size alone is checked
     made = make_prepared(1, 12)
     made.key = "these matrices"
     case, _ = make_load(2, made)
@@ -141,6 +144,13 @@ def test_reference_is_computed_once(tmp_path: object, monkeypatch: pytest.Monkey
     for other in (replace(case, f=2 * case.f), replace(case, g=case.g + 0.1)):
         with pytest.raises(pytest.fail.Exception, match="second time"):
             reference(made, other)
+    (path,) = tmp_path.glob("*/x.npy")
+    path.chmod(0o644)
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(pytest.fail.Exception, match="second time"):
+        reference(made, case)
 
 
 def test_a_row_says_why_it_cannot_be_judged(tmp_path: Path) -> None:
