@@ -12,7 +12,9 @@ from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+import scipy.sparse as sp
 
+from harness.verification.judge import LIMIT_MM
 from problems.build import adopts_model, load_case
 from problems.errors import InputError
 from problems.forms import Form
@@ -139,6 +141,8 @@ class StagedSession:
             yield self._through(numbers[start : start + BLOCK])
 
     def _through(self, block: Sequence[int]) -> list[Result]:
+        unproven = np.zeros(len(block), bool)  # of each case: whether such an answer has locked fasteners
+
         def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, list[Result]]:
             session = self._session(part, approaches, block)
             attempts = [attempt for some in session.attempted(block) for attempt in some]
@@ -147,10 +151,17 @@ class StagedSession:
             for column, case in enumerate(block):
                 if case in assessed:
                     x[:, column] = session.data.assembly.at_junction(assessed[case].x)
-            return lambda T: T.T @ x, session.results(attempts, assessed)
+            bounds = [assessed[case].bound_mm if case in assessed else np.inf for case in block]
+
+            def elongations(T: sp.csc_array) -> Matrix:
+                np.logical_or(unproven, np.array(bounds) > LIMIT_MM, out=unproven)
+                return T.T @ x
+
+            return elongations, session.results(attempts, assessed)
 
         history = [(name, results) for name, _, _, results in through(self.scene, solved, len(block))]
-        return [self._result([(name, results[k]) for name, results in history]) for k in range(len(block))]
+        of_case = ([(name, results[k]) for name, results in history] for k in range(len(block)))
+        return [self._result(*both) for both in zip(of_case, unproven.tolist(), strict=True)]
 
     def _session(self, part: JointScene, approaches: Matrix, block: Sequence[int]) -> SeriesSession:
         """The session of K of a stage, with the load cases of the stage."""
@@ -163,22 +174,25 @@ class StagedSession:
         return session
 
     @staticmethod
-    def _result(stages: list[tuple[str, Result]]) -> Result:
+    def _result(stages: list[tuple[str, Result]], unproven: bool) -> Result:
         """The result of the last stage, with the largest gap of each, and the verdict of the first that is
-        not within: after it, the error of a gap is not known.
+        not within.
+
+        unproven : whether fasteners have locked what is not proven to 1e-7 mm, so that no later error is known.
         """
         row, gap = stages[-1][1]
-        gaps = {name: result.row.get("max_gap_mm") for name, result in stages}
+        gaps = {"stages_max_gap_mm": {name: result.row.get("max_gap_mm") for name, result in stages}}
+        if unproven and gap is not None:
+            row = row | {"gap_error_mm": np.inf, "bound_mm": np.inf, "verdict": "cannot_be_judged"}
+            row = row | {"message": f"fasteners lock what is not proven to {LIMIT_MM:g} mm"}
         failed = next(((name, one.row) for name, one in stages if one.row["verdict"] != "within"), None)
         if failed is None:
-            return Result(row | {"stages_max_gap_mm": gaps}, gap)
+            return Result(row | gaps, gap)
         name, other = failed
-        said = f"stage {name}: {other['message'] or other['verdict']}"
         if other["verdict"] == "no_answer":  # later stages have locked nothing that counts
             row, gap = other, None
-        elif name != stages[-1][0]:
-            row = row | {"gap_error_mm": np.inf, "bound_mm": np.inf}
-        return Result(row | {"verdict": other["verdict"], "message": said, "stages_max_gap_mm": gaps}, gap)
+        said = f"stage {name}: {other['message'] or other['verdict']}"
+        return Result(row | {"verdict": other["verdict"], "message": said} | gaps, gap)
 
 
 def session_of(job: Job) -> SeriesSession | StagedSession:
