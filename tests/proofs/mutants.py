@@ -245,6 +245,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "self.last.data, np.zeros(": ("self.last.data, -1e-4 * np.ones(",),
         "(stage.springs.k[:, None] * approaches)": ("(0 * approaches)",),
         " - overlap.T @ self.vectors[0]": (" + overlap.T @ self.vectors[0]",),
+        "if self.tolerance <= TOLERANCE_MM": ("if False",),
         "> LIMIT_MM).any(axis=0), np.inf": ("> LIMIT_MM).any(axis=0), 0.0",),
     },
     "harness/placement/plan_search.py": {
