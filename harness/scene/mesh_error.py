@@ -36,7 +36,8 @@ from problems.model.stage_answers import Elongations, locked, through
 @dataclass(frozen=True)
 class MeshError:
     """An estimate. error_mm : of the gaps. grids : number of meshes. order : observed on three, else None.
-    stress : of the largest von Mises stress, N/mm², from the coarser mesh; None unless it was asked for.
+    stress : of the largest von Mises stress, N/mm², from the coarser mesh; None unless it was asked for, and
+    where a stress is not known.
     """
 
     error_mm: float
@@ -73,8 +74,9 @@ def estimated(
         return None
     stress = None
     if largest_stress is not None:
-        here = largest_stress(replace(last, joint=joint), solution.unknowns)
-        stress = abs(here - largest_stress(last, x)) / (min(ratios) - 1)
+        here, there = largest_stress(replace(last, joint=joint), solution.unknowns), largest_stress(last, x)
+        if max(here, there) < np.inf:
+            stress = abs(here - there) / (min(ratios) - 1)
     if halved is None:
         return MeshError(moved / (min(ratios) - 1), 2, stress=stress)
     return MeshError(halved * 4 / 3, 3, float(np.log2(moved / halved)) if moved and halved else None, stress)

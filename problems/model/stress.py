@@ -50,9 +50,12 @@ class PartStress:
 
     @property
     def von_mises(self) -> Vector:
-        """(k,) √(σ_xx² − σ_xx σ_yy + σ_yy² + 3 τ_xy²)."""
-        x, y, xy = self.components.T
-        return np.sqrt(x**2 - x * y + y**2 + 3 * xy**2)
+        """(k,) √(σ_xx² − σ_xx σ_yy + σ_yy² + 3 τ_xy²); infinite, never NaN, where it is not known."""
+        scale = abs(self.components).max(axis=1)  # squares of what is above 1e154 overflow
+        with np.errstate(over="ignore", invalid="ignore"):
+            x, y, xy = self.components.T / np.where(scale > 0, scale, 1.0)
+            value = scale * np.sqrt(x**2 - x * y + y**2 + 3 * xy**2)
+        return np.where(np.isnan(value), np.inf, value)
 
 
 def part_stress(
