@@ -1,6 +1,7 @@
 """Stresses of plates against closed forms (Timoshenko and Woinowsky-Krieger 1959), and their errors."""
 
 import json
+from itertools import pairwise, product
 from pathlib import Path
 
 import meshio
@@ -155,6 +156,21 @@ def test_no_error_changes_a_stress_by_more_than_its_energy_allows(pad: float | N
             e[free] = values
             shares.append(changed(e).max())
     assert 0.05 < max(shares) <= 1.0
+
+
+def test_a_thin_place_between_the_gauss_points_counts() -> None:
+    """K has it: σ = s u changes by up to √(s K⁺ sᵀ) per unit of energy. Thick at the points alone."""
+    lines, cuts = np.array([0.0, 2.0]), (0.0, 0.40, 0.44, 1.56, 1.60, 2.0)
+    thick = [(0.40, 0.44), (1.56, 1.60)]
+    thin = [cell for cell in product(pairwise(cuts), repeat=2) if not {*cell} <= {*thick}]
+    pads = tuple(
+        LocalThickness(kind="local_thickness", part="p", thickness=T / 10, x=x, y=y) for x, y in thin
+    )
+    model, units = PartModel(Plate(lines, lines, T, E, NU), pads, range(2)), np.eye(16)
+    s = np.array([part_stress("p", model, (), unit, NOWHERE).components for unit in units])
+    compliance = np.linalg.pinv(model.stiffness().toarray(), rcond=1e-12, hermitian=True)
+    most = np.sqrt(np.einsum("ikc,ij,jkc->kc", s, compliance, s))
+    assert (most.max(axis=1) <= part_stress("p", model, (), units[0], NOWHERE).sensitivity).all()
 
 
 def made(*components: tuple[float, float, float], error: float = 0.0) -> Stresses:

@@ -367,6 +367,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "of_xx + nu * of_yy": ("of_xx - nu * of_yy", "of_xx"),
         "(1 - nu) * of_xy": ("of_xy",),
         "thickness[((low <= places)": ("thickness[((low > places)",),
+        "min([plate.thickness, *(pad for pad, _, _ in pads)])": ("thickness.min()",),
         "max(1.0, 1.5 * (1 - nu)) * s**2": ("0.001 * s**2",),
         "x**2 - x * y + y**2": ("x**2 + y**2",),
     },
