@@ -5,7 +5,8 @@ the joint is solved on another mesh. On a coarser one, with r times the distance
 
     e_h ≈ max |y_h − y_rh| / (r − 1)
 
-at its contacts: a rough figure, which assumes that the error falls like h. On a finer one, with h/2,
+at its contacts, or of the largest gaps of a pair, as gaps may be all between them: a rough figure, which
+assumes that the error falls like h. On a finer one, with h/2,
 
     e_h ≈ 4/3 max |y_h − y_h/2|,
 
@@ -110,8 +111,8 @@ def remeshed(joint: Joint, factor: float) -> Joint:
 
 
 def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector]:
-    """max |y_h − y| over the contacts of the coarser of the two meshes, y the gaps on another mesh, mm; and
-    the scene there, without stages, with its û.
+    """max |y_h − y| over the contacts of the coarser of the two meshes, y the gaps on another mesh, and over
+    the largest gaps of the pairs, mm; and the scene there, without stages, with its û.
 
     Raises InputError if the other mesh has no answer.
     """
@@ -134,7 +135,9 @@ def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector
 
     *_, (_, _, _, (gap, last, x)) = through(other, answer)
     nodes = min(here.nodes, joint.nodes, key=len)
-    return float(abs(_at(here, solution.gap, nodes) - _at(joint, gap, nodes)).max()), last, x
+    moved = _at(here, solution.gap, nodes) - _at(joint, gap, nodes)
+    mine, its = (each.reshape(len(joint.pairs), -1).max(axis=1) for each in (solution.gap, gap))
+    return float(abs(np.append(moved, mine - its)).max()), last, x
 
 
 def _at(joint: Joint, values: Vector, places: Matrix) -> Vector:
