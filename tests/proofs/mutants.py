@@ -265,7 +265,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "(held >= 0 and asking[held].any())": ("False",),
     },
     "harness/shimming/study.py": {
-        "force_error_per_mm(scene) * answer.bound_mm": ("-1e-3",),
+        "force_error(Springs.of(scene), scene, at, answer.bound_mm)": ("-1e-3",),
         "if answer.bound_mm else 0.0": ("if False else -1.0",),
         "at <= 0.5), mask": ("at < 0.5), mask",),
         "at >= 0.5)": ("at > 0.5)",),
@@ -345,6 +345,9 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "k * (self.approach - T.T @ x)",
             "k * (self.approach + T.T @ x) + np.resize(self.preload, len(k))",
         ),
+    },
+    "problems/model/fastener_forces.py": {
+        "size.sum(axis=0) * error_mm + rounding": ("size.sum(axis=0) * error_mm", "rounding"),
     },
     "problems/model/joint_model.py": {
         "self.springs.key(key) if self.springs else key\n        like": ("key\n        like",),
@@ -448,6 +451,7 @@ TESTS = {
         "proofs/test_fuzz_exact.py",
     ),
     "problems/model/effect.py": ("problems/test_stages.py",),
+    "problems/model/fastener_forces.py": ("problems/test_effects.py",),
     "problems/model/joint_model.py": ("problems/test_stages.py",),
     "problems/model/stage_answers.py": ("problems/test_stages.py",),
     "problems/model/stages.py": ("problems/test_stages.py",),
