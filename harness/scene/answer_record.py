@@ -19,6 +19,7 @@ from problems.model.joint import Joint
 from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.reporter import Stage
 from problems.stiffness import SAFE, gamma
+from report.document.numbers import upwards
 
 from .solution import Solution
 from .stages import StageAnswer
@@ -121,9 +122,11 @@ def summary(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
     proven = np.isfinite(bound)
     if error is None:
         where = " of the last stage" if "stages" in record else ""
-        text = f"every displacement{where} within {bound:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
+        text = f"a bound {UNPROVEN}"
+        if proven:
+            text = f"every displacement{where} within {upwards(bound)} mm, proven"
     else:
-        which = f"with a proven bound ({bound:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
+        which = f"with a proven bound ({upwards(bound)} mm)" if proven else f"whose bound {UNPROVEN}"
         away = f"{error:.1e} mm from the answer {which}"
         text = f"{record['status']}, {away}: {record['verdict']} {LIMIT_MM:g} mm"
     yield f"{record['method']}: {text}.", "green" if record["verdict"] == "within" else "red"

@@ -21,7 +21,7 @@ from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import damage
 from problems.input.tables import Cells, doubt, is_stray, number
 from problems.model.scene import JointScene
-from report.document.numbers import position
+from report.document.numbers import position, upwards
 
 LARGEST_MIB = 1024
 #: The vectors of an answer, by their names in a file.
@@ -67,7 +67,7 @@ def judge_file(
     text = f"{judgement.verdict.capitalize()} {limit:.3g} mm."
     if judgement.verdict == "cannot_be_judged":
         how = problem.reference.route
-        text = f"Cannot be judged: the reference is proven only to {bound:.1e} mm ({how})."
+        text = f"Cannot be judged: the reference is proven only to {upwards(bound)} mm ({how})."
     console.print(text, style=STYLES[judgement.verdict])
     return CODES[judgement.verdict]
 
@@ -81,8 +81,8 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
     at = f"entry {worst}" if nodes is None else position(nodes[worst], nodes)
     table = Table("figure", "value", title=f"{problem.scene.name}: the answer judged")
     table.add_row("largest displacement error, mm", f"{error:.3e} at {at}")
-    table.add_row("proven: every displacement within, mm", f"{error + bound:.3e}")
-    table.add_row("error bound of the reference, mm", f"{bound:.1e}")
+    table.add_row("proven: every displacement within, mm", upwards(error + bound, 4))
+    table.add_row("error bound of the reference, mm", upwards(bound))
     table.add_row("contacts open or closed by mistake", str(judgement.contact_mismatch))
     table.add_row("largest overlap, mm", f"{judgement.primal_residual or 0.0:.3e}")
     if judgement.dual_residual is not None:
