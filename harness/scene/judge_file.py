@@ -12,6 +12,7 @@ from rich.table import Table
 from harness.results.comparison import Incomparable
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
+from harness.verification.assess import error_bound
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem, measurable
 from problems.errors import InputError
@@ -81,7 +82,7 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
     at = f"entry {worst}" if nodes is None else position(nodes[worst], nodes)
     table = Table("figure", "value", title=f"{problem.scene.name}: the answer judged")
     table.add_row("largest displacement error, mm", f"{error:.3e} at {at}")
-    table.add_row("proven: every displacement within, mm", upwards(error + bound, 4))
+    table.add_row("proven: every displacement within, mm", upwards(error_bound(error, bound), 4))
     table.add_row("error bound of the reference, mm", upwards(bound))
     table.add_row("contacts open or closed by mistake", str(judgement.contact_mismatch))
     table.add_row("largest overlap, mm", f"{judgement.primal_residual or 0.0:.3e}")
