@@ -79,6 +79,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         " * np.repeat(D[rows], np.diff(panel.indptr))": ("",),
         "self.D * both.f": ("both.f",),
         "self.R * both.g": ("both.g",),
+        "np.where(lost, np.copysign(ETA, value), scaled)": ("scaled",),
         "float((self.assembly.K.absolute_sums(D) * D).max(initial=0.0))": (
             "float(self.assembly.K.absolute_sums(D).max(initial=0.0))",
         ),
@@ -132,7 +133,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "(reach * error + D * away / 2)",
             "(reach * error + away)",
         ),
-        " + ETA * x.hi.any(axis=0)": ("",),
+        "ETA * (x.hi.any(axis=0) | (error > 0))": ("0.0", "ETA * x.hi.any(axis=0)"),
         " & ~(lam.hi < 0).any(axis=0)": ("",),
         "np.where(valid, bounds, np.inf), (reach": ("bounds, (reach",),
         "np.where(C, At @ dx - y, 0.0)": ("np.where(C, -y, 0.0)",),
