@@ -33,7 +33,7 @@ from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
 from problems.scene_files import scene_of
-from report.document.numbers import counted, position
+from report.document.numbers import counted, position, upwards
 from report.document.verdict_colours import FAIL, PASS
 
 VIEWPORT = '<meta name="viewport" content="width=device-width">'
@@ -219,7 +219,8 @@ def outcome(answer: LiveAnswer, places: Matrix, limit_mm: float) -> str:
     k = int(answer.gap.argmax())
     gap, place = float(answer.gap[k]), position(places[k], places)
     e = answer.error_mm
-    sure = "…" if e is None else f"every gap within {e:.1e} mm, proven" if np.isfinite(e) else "not proven"
+    proven = e is not None and np.isfinite(e)
+    sure = "…" if e is None else f"every gap within {upwards(e)} mm, proven" if proven else "not proven"
     untold = e is not None and not abs(gap - limit_mm) > e
     word = "cannot be told" if untold else "PASS" if gap <= limit_mm else "FAIL"
     colour = {"PASS": PASS, "FAIL": FAIL}.get(word, "#666666")

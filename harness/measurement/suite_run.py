@@ -30,7 +30,7 @@ from harness.verification.reference_problem import (
 from problems.forms import form_family
 from problems.forms.problem import in_form
 from problems.scene_files import read_scene
-from report.document.numbers import counted
+from report.document.numbers import counted, upwards
 
 from .recorded_suite import other_suite, record_suite
 from .scheduler import done_as_completed, workers
@@ -215,7 +215,9 @@ def summary(rows: list[Row], console: Console) -> int:
     if unjudged := [row for row in rows if row["verdict"] == "cannot_be_judged"]:
         bounds = (row["reference_bound_mm"] for row in unjudged)  # null is an infinite one
         least = min(inf if bound is None else bound for bound in bounds)
-        proven = f"the references are proven to {least:.0e} mm" if least < inf else "no reference is proven"
+        proven = "no reference is proven"
+        if least < inf:
+            proven = f"the references are proven to {upwards(least, 1)} mm"
         why = f"{proven}, and a tenth of the limit is needed"
     console.print(f"Nothing could be judged: {why}.", style="red")
     return NOTHING_JUDGED

@@ -16,6 +16,7 @@ from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
 from problems.forms.problem import in_form
+from report.document.numbers import upwards
 
 from .solver_descriptions import Description
 from .worker import FinishedReport, measure, scene_to_measure
@@ -87,7 +88,7 @@ def rows_of(
 def why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | None:
     if judgement.verdict != "cannot_be_judged":
         return None
-    return f"reference error bound {problem.reference.bound_mm:.0e} mm: {problem.reference.route}"
+    return f"reference error bound {upwards(problem.reference.bound_mm, 1)} mm: {problem.reference.route}"
 
 
 def _row(

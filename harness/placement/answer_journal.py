@@ -74,6 +74,10 @@ def recorded_form(path: Path, forms: Sequence[Form]) -> Form | None:
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:
-    largest = tuple(inf if value is None else value for value in row["largest"])
-    further, plan = (tuple(map(tuple, row[name])) for name in ("further", "plan"))
-    return Outcome(largest, tuple(row["contact"]), tuple(row["mean"]), further, plan)
+    largest, mean, *further = map(_figures, (row["largest"], row["mean"], *row["further"]))
+    return Outcome(largest, tuple(row["contact"]), mean, tuple(further), tuple(map(tuple, row["plan"])))
+
+
+def _figures(values: Sequence[float | None]) -> tuple[float, ...]:
+    """The figures of a line, whose null is an infinite one."""
+    return tuple(inf if value is None else value for value in values)

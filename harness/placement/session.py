@@ -167,8 +167,9 @@ class ItemSession(StiffnessSession):
 class StageAnswers:
     """The answers to load cases of one stage, made when they are needed.
 
-    approaches : of its springs, (r, k) mm. near : those of another plan in each case, from which these are
-    estimated; None: these are accurate. locks : whether fasteners have locked what these have reached.
+    approaches : of its springs, (r, k) mm. tolerance : TOLERANCE_MM if these are to be proven. near : those
+    of another plan in each case, from which these are estimated. locks : whether fasteners have locked what
+    these have reached.
     """
 
     session: ItemSession
@@ -195,8 +196,13 @@ class StageAnswers:
         return assess(self.session.proof, self.loads, lams, [None] * len(lams), ENOUGH_MM)
 
     def elongations(self, T: sp.csc_array) -> Matrix:
-        """Tᵀx = (K⁻¹T)ᵀf − (AᵀK⁻¹T)ᵀλ, (r, k) mm."""
+        """Tᵀx (r, k) mm: of the proven answers x, or estimated as (K⁻¹T)ᵀf − (AᵀK⁻¹T)ᵀλ, which rounding moves
+        as far as K is ill-conditioned.
+        """
         self.locks = True
+        if self.tolerance <= TOLERANCE_MM:
+            proven = np.column_stack([answer.x for answer in self.proven])
+            return np.asarray(T.T @ self.session.data.assembly.at_junction(proven))
         x, overlap = self.session.springs(T)
         return x.T @ np.column_stack([load.f for load in self.loads]) - overlap.T @ self.vectors[0]
 

@@ -23,7 +23,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
-from report.document.numbers import counted, position
+from report.document.numbers import counted, position, upwards
 
 from .mesh_error import MeshError
 from .solution import Solution
@@ -138,7 +138,7 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
         _, high = share_interval(drawn - len(free.cases), drawn)
         sure += f"; the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
     kind, said = "" if result.undecided or answered < count else "pass", [f"{sure}."]
-    untold = {f"gaps are proven only to {result.uncertainty_mm:.1e} mm": result.undecided}
+    untold = {f"gaps are proven only to {upwards(result.uncertainty_mm)} mm": result.undecided}
     untold["there is no answer"] = count - answered
     for why, some in untold.items():
         if some:

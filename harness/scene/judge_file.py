@@ -12,6 +12,7 @@ from rich.table import Table
 from harness.results.comparison import Incomparable
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
+from harness.verification.assess import error_bound
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem, measurable
 from problems.errors import InputError
@@ -20,11 +21,13 @@ from problems.forms.assembly import Assembly, Vector
 from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import damage
 from problems.input.tables import Cells, doubt, is_stray, number
-from report.document.numbers import position
+from problems.model.scene import JointScene
+from report.document.numbers import position, upwards
 
 LARGEST_MIB = 1024
 #: The vectors of an answer, by their names in a file.
 VECTORS = {"x": "x", "displacement_mm": "x", "lam": "lam", "force_N": "lam"}
+SHOWN = "displacement_mm"  # of nodes.csv, along the normals
 PLACES = ("x_mm", "y_mm")
 SAME_PLACE = 1e-6  # of the extent of the nodes
 ALLOWED = "a .npz or .csv file with numbers"
@@ -48,7 +51,10 @@ def judge_file(
         raise InputError.one("--limit", "limit, mm", limit_mm, "must be positive and finite")
     answer = read_answer(path)
     problem = measurable(source, limit_s=reference_limit_s, form=form)
-    assembly = problem.prepared.assembly
+    assembly, scene = problem.prepared.assembly, problem.scene
+    if SHOWN in answer and isinstance(scene, JointScene) and scene.joint.shown is not None:
+        allowed = "x, all unknowns of K, as `unknowns` of solution.npz: these are displacements along normals"
+        raise InputError.one(path, "names", SHOWN, allowed)
     for name, size in (("x", assembly.n), ("lam", assembly.m)):
         if name in answer and len(answer[name]) != size:
             allowed = f"{size} in the {form} form of {problem.scene.name}; name another form with --form"
@@ -62,7 +68,7 @@ def judge_file(
     text = f"{judgement.verdict.capitalize()} {limit:.3g} mm."
     if judgement.verdict == "cannot_be_judged":
         how = problem.reference.route
-        text = f"Cannot be judged: the reference is proven only to {bound:.1e} mm ({how})."
+        text = f"Cannot be judged: the reference is proven only to {upwards(bound)} mm ({how})."
     console.print(text, style=STYLES[judgement.verdict])
     return CODES[judgement.verdict]
 
@@ -76,8 +82,8 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
     at = f"entry {worst}" if nodes is None else position(nodes[worst], nodes)
     table = Table("figure", "value", title=f"{problem.scene.name}: the answer judged")
     table.add_row("largest displacement error, mm", f"{error:.3e} at {at}")
-    table.add_row("proven: every displacement within, mm", f"{error + bound:.3e}")
-    table.add_row("error bound of the reference, mm", f"{bound:.1e}")
+    table.add_row("proven: every displacement within, mm", upwards(error_bound(error, bound), 4))
+    table.add_row("error bound of the reference, mm", upwards(bound))
     table.add_row("contacts open or closed by mistake", str(judgement.contact_mismatch))
     table.add_row("largest overlap, mm", f"{judgement.primal_residual or 0.0:.3e}")
     if judgement.dual_residual is not None:
@@ -87,11 +93,11 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
 
 
 def read_answer(path: Path) -> dict[str, Vector]:
-    """The vectors of a file by name: "x" (displacements) and "lam" (contact forces), or one of them, and the
-    PLACES of a .csv that has them.
+    """The vectors of a file by name: "x" (displacements) and "lam" (contact forces), or one of them; SHOWN if
+    x had that name; and the PLACES of a .csv that has them.
 
     An .npz has arrays of the names in VECTORS, a .csv columns, as nodes.csv and contacts.csv of `solve`;
-    never both names of one vector. Raises InputError.
+    never both names of one vector. x of solution.npz is `unknowns` if that is beside it. Raises InputError.
     """
     if path.suffix.lower() not in (".npz", ".csv"):
         raise InputError.one(path, "suffix", path.suffix, ALLOWED)
@@ -101,7 +107,10 @@ def read_answer(path: Path) -> dict[str, Vector]:
             arrays: Mapping[str, Any] = _columns(path)
         else:
             with np.load(path, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in VECTORS if name in archive.files}
+                names = {name: name for name in VECTORS if name in archive.files}
+                if "x" in names and "unknowns" in archive.files:
+                    names["x"] = "unknowns"
+                arrays = {name: archive[stored] for name, stored in names.items()}
     except InputError:
         raise
     except Exception as error:  # numpy, zipfile and csv raise kinds of their own
@@ -119,7 +128,7 @@ def read_answer(path: Path) -> dict[str, Vector]:
     if not vectors or len(vectors) < len(arrays):
         allowed = "x or displacement_mm, lam or force_N: one of them alone"
         raise InputError.one(path, "names", list(arrays), allowed)
-    return vectors
+    return vectors | ({SHOWN: vectors["x"]} if SHOWN in arrays else {})
 
 
 def refuse_other_places(path: Path, answer: Mapping[str, Vector], assembly: Assembly) -> None:

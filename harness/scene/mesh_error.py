@@ -5,7 +5,8 @@ the joint is solved on another mesh. On a coarser one, with r times the distance
 
     e_h ≈ max |y_h − y_rh| / (r − 1)
 
-at its contacts: a rough figure, which assumes that the error falls like h. On a finer one, with h/2,
+at its contacts, or of the largest gaps of a pair, as gaps may be all between them: a rough figure, which
+assumes that the error falls like h. On a finer one, with h/2,
 
     e_h ≈ 4/3 max |y_h − y_h/2|,
 
@@ -36,7 +37,8 @@ from problems.model.stage_answers import Elongations, locked, through
 @dataclass(frozen=True)
 class MeshError:
     """An estimate. error_mm : of the gaps. grids : number of meshes. order : observed on three, else None.
-    stress : of the largest von Mises stress, N/mm², from the coarser mesh; None unless it was asked for.
+    stress : of the largest von Mises stress, N/mm², from the coarser mesh; None unless it was asked for, and
+    where a stress is not known.
     """
 
     error_mm: float
@@ -73,8 +75,9 @@ def estimated(
         return None
     stress = None
     if largest_stress is not None:
-        here = largest_stress(replace(last, joint=joint), solution.unknowns)
-        stress = abs(here - largest_stress(last, x)) / (min(ratios) - 1)
+        here, there = largest_stress(replace(last, joint=joint), solution.unknowns), largest_stress(last, x)
+        if max(here, there) < np.inf:
+            stress = abs(here - there) / (min(ratios) - 1)
     if halved is None:
         return MeshError(moved / (min(ratios) - 1), 2, stress=stress)
     return MeshError(halved * 4 / 3, 3, float(np.log2(moved / halved)) if moved and halved else None, stress)
@@ -108,8 +111,8 @@ def remeshed(joint: Joint, factor: float) -> Joint:
 
 
 def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector]:
-    """max |y_h − y| over the contacts of the coarser of the two meshes, y the gaps on another mesh, mm; and
-    the scene there, without stages, with its û.
+    """max |y_h − y| over the contacts of the coarser of the two meshes, y the gaps on another mesh, and over
+    the largest gaps of the pairs, mm; and the scene there, without stages, with its û.
 
     Raises InputError if the other mesh has no answer.
     """
@@ -132,7 +135,9 @@ def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector
 
     *_, (_, _, _, (gap, last, x)) = through(other, answer)
     nodes = min(here.nodes, joint.nodes, key=len)
-    return float(abs(_at(here, solution.gap, nodes) - _at(joint, gap, nodes)).max()), last, x
+    moved = _at(here, solution.gap, nodes) - _at(joint, gap, nodes)
+    mine, its = (each.reshape(len(joint.pairs), -1).max(axis=1) for each in (solution.gap, gap))
+    return float(abs(np.append(moved, mine - its)).max()), last, x
 
 
 def _at(joint: Joint, values: Vector, places: Matrix) -> Vector:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from harness.planning.form_choice import Choice, chosen_form
 from harness.solving.solver_session import answer_of, form_of
-from harness.verification.assess import GapError
+from harness.verification.assess import GapError, error_bound
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, open_stage
 from problems.errors import InputError
@@ -296,13 +296,15 @@ def _solved(
     if named is None:  # the error of the reference is its bound
         proven, error = reference.bound_mm <= LIMIT_MM, 0.0
         judgement = replace(judgement, verdict="within" if proven else "cannot_be_judged")
+    bound = inf if error is None else reference.bound_mm
+    bound = error_bound(error, bound) if error else bound
     return Solution(
         lam=lam,
         gap=problem.load.g - assembly.A.T @ x,
         status=answer.status,
         iterations=answer.iterations,
         judgement=judgement,
-        error_bound_mm=np.inf if error is None else error + reference.bound_mm,
+        error_bound_mm=bound,
         notes=assembly.notes,
         method=method,
         from_reference=named is None,

@@ -31,6 +31,7 @@ from problems.model.positions import Positions
 from problems.model.scene import JointScene, Scene
 from problems.model.stress import PartStress, part_stress
 from problems.stiffness import gamma
+from report.document.numbers import upwards
 
 from .mesh_error import MeshError
 from .solution import Solution
@@ -82,12 +83,14 @@ class Stresses:
         }
 
     def exceeded(self, allowed: float) -> bool | None:
-        """Whether a von Mises stress away from forces at points is larger; None if it cannot be told."""
+        """Whether a von Mises stress away from forces at points is larger; None if it cannot be told, as
+        where a stress or its error overflows.
+        """
         pairs = zip(self.parts, self.errors, strict=True)
         told = [(part.von_mises[~part.near_force], e[~part.near_force]) for part, e in pairs]
-        if any((value - e > allowed).any() for value, e in told):
+        if any((value[value < np.inf] - e[value < np.inf] > allowed).any() for value, e in told):
             return True
-        return None if any((value + e > allowed).any() for value, e in told) else False
+        return False if all((value + e <= allowed).all() for value, e in told) else None
 
 
 def stress_record(assembly_stress: Stresses, mesh: MeshError | None, allowed: float | None) -> dict[str, Any]:
@@ -100,9 +103,8 @@ def stress_record(assembly_stress: Stresses, mesh: MeshError | None, allowed: fl
         untold = {} if allowed is None else {"allowed": allowed, "exceeded": None}
         return untold | {"kind": "", "said": "Forces at points act near all elements: no stress is told"}
     at = f"{largest['part']}, on {largest['face']}, x = {largest['x']:.4g} mm, y = {largest['y']:.4g} mm"
-    said = (
-        f"largest von Mises stress {largest['von_mises']:.3g} N/mm², {at}; proven to {largest['error']:.1e}"
-    )
+    said = f"largest von Mises stress {largest['von_mises']:.3g} N/mm², {at}"
+    said += f"; proven to {upwards(largest['error'])}"
     grid = None if mesh is None else mesh.stress
     said += ", mesh error not known" if grid is None else f", mesh error about {grid:.1g} N/mm²"
     if none := [part.part for part in assembly_stress.parts if not len(part.places)]:
@@ -134,8 +136,10 @@ def largest_of(
     """
     parts, largest = stresses_of(scene, x), 0.0
     for part, error in zip(parts, point_sensitivities or [part.sensitivity for part in parts], strict=True):
-        upper = part.von_mises + (energy * error if energy else 0.0)  # an error may be infinite
-        largest = max(largest, float(upper[~part.near_force].max(initial=0.0)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            upper = part.von_mises + (energy * error if energy else 0.0)  # an error may be infinite
+        known = np.where(np.isnan(upper), np.inf, upper)[~part.near_force]
+        largest = max(largest, float(known.max(initial=0.0)))
     return largest
 
 
@@ -183,7 +187,7 @@ def stresses(solution: Solution) -> Stresses:
         exact = stresses_of(problem.scene, reference.x)
         for part, other, error in zip(parts, exact, errors, strict=True):
             error += np.sqrt(3) * abs(part.components - other.components).sum(axis=1)
-    return Stresses(parts, tuple(errors))
+    return Stresses(parts, tuple(np.where(np.isnan(error), np.inf, error) for error in errors))
 
 
 def stresses_of(scene: Scene, x: Vector) -> tuple[PartStress, ...]:

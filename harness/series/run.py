@@ -28,7 +28,7 @@ from problems.errors import Fault, InputError
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
-from report.document.numbers import counted
+from report.document.numbers import counted, upwards
 
 from .executors import results_of
 from .session import Job, Result
@@ -186,7 +186,7 @@ def summary(rows: Iterable[Row], cases: int, console: Console) -> int:
             compared, worst_error = compared + 1, max(worst_error, error)
     seen = [f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items() if count]
     proven = np.isfinite(worst_bound)
-    said = f"largest proven error bound {worst_bound:.1e} mm" if proven else f"some bounds {UNPROVEN}"
+    said = f"largest proven error bound {upwards(worst_bound)} mm" if proven else f"some bounds {UNPROVEN}"
     said += f", largest of {compared} checked {worst_error:.1e} mm" if compared else ""
     console.print(f"{', '.join(seen)}; {said}")
     if missing := cases - sum(counts.values()):

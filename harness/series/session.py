@@ -26,8 +26,9 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.load_cases import LoadCases
-from problems.model.fastener_forces import fastener_forces, force_error_per_mm
-from problems.model.scene import Scene
+from problems.model.fastener_forces import fastener_forces, force_error
+from problems.model.scene import JointScene, Scene
+from problems.model.springs import Springs
 from problems.reporter import Reporter
 from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver
@@ -133,7 +134,7 @@ class SeriesSession(Reporter):
         self.block = min(BLOCK, max(BLOCK_BYTES // (8 * self.data.assembly.n), 1))
         self.proof = proof_of(self.data)
         self.gap_error = GapError.of(self.data.assembly)
-        self.force_error = force_error_per_mm(job.scene)
+        self.springs = Springs.of(job.scene) if isinstance(job.scene, JointScene) else None
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.solver_options, job.plugin)
         self.row: Row = {}  # of the case being solved
@@ -251,10 +252,10 @@ class SeriesSession(Reporter):
             "max_gap_mm": float(assessment.gap.max()),
             "verdict": "within" if assessment.bound_mm <= job.limit_mm else "cannot_be_judged",
         }
-        if self.force_error and (scene := job.cases.scene_of(attempt.case)):
-            forces = fastener_forces(scene, self.data.assembly.at_junction(assessment.x))
-            row["fastener_forces_N"] = [fastener["force_N"] for fastener in forces]
-            row["force_error_N"] = self.force_error * assessment.bound_mm
+        if self.springs and (scene := job.cases.scene_of(attempt.case)):
+            x = self.data.assembly.at_junction(assessment.x)
+            row["fastener_forces_N"] = [fastener["force_N"] for fastener in fastener_forces(scene, x)]
+            row["force_error_N"] = force_error(self.springs, scene, x, assessment.bound_mm)
         if job.check and attempt.case % job.check == 0:
             row |= self._against_reference(attempt, assessment.x)
         return Result(row, assessment.gap.astype(np.float32))

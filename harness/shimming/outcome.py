@@ -15,7 +15,7 @@ from harness.scene.mesh_error import estimated, mesh_record
 from harness.scene.solution import solve
 from problems.model.fastener_forces import fastener_forces
 from problems.scene_files import read_scene
-from report.document.numbers import counted, position
+from report.document.numbers import counted, position, upwards
 
 from .patches import BORDERS
 from .study import ShimStudy
@@ -88,6 +88,6 @@ def solver_statements(path: Path, shims: int, allowed_mm: float) -> dict[str, An
     answers = [solve(without), solve(after)]
     check = check_answer(answers[1], allowed_mm, [], mesh := estimated(answers[1]))
     pairs = zip(*(fastener_forces(answer.problem.scene, answer.x) for answer in answers), strict=True)
-    sure = [f"Solver: gaps proven to {check['uncertainty_mm']:.1e} mm", mesh_record(mesh)["said"]]
+    sure = [f"Solver: gaps proven to {upwards(check['uncertainty_mm'])} mm", mesh_record(mesh)["said"]]
     sure.append(f"Scan: {check.get('beyond_scan', 'no contact is beyond measured points')}")
     return {"sure": sure, "forces": [old | {"with_shims_N": new["force_N"]} for old, new in pairs]}

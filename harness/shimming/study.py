@@ -11,8 +11,9 @@ from harness.placement.session import CaseAnswer, Study
 from harness.scene.stress import largest_of
 from problems.effects.shims import Shims
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
-from problems.model.fastener_forces import fastener_forces, force_error_per_mm
+from problems.model.fastener_forces import fastener_forces, force_error
 from problems.model.scene import JointScene
+from problems.model.springs import Springs
 
 from .patches import Patch
 
@@ -87,7 +88,7 @@ class ShimStudy(Study):
         if self.limits[0] < inf:
             scene, at = answer.scene, session.data.assembly.at_junction(x)
             force = max(abs(fastener["force_N"]) for fastener in fastener_forces(scene, at))
-            force += force_error_per_mm(scene) * answer.bound_mm
+            force += force_error(Springs.of(scene), scene, at, answer.bound_mm)
         if self.limits[1] < inf:
             energy = session.proof.energy_error(answer.load, x, answer.lam) if answer.bound_mm else 0.0
             stress = largest_of(self.bare, x, energy, session.sensitivities)

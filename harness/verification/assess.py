@@ -16,6 +16,7 @@ comparison with a limit, |fl(ŷ ± E) − (ŷ ± E)| ≤ u(|ŷ| + E), and a fact
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -65,7 +66,7 @@ def assess(
     gap, r = load.g - assembly.A.T @ x, load.f - assembly.K.multiply(x) - assembly.A @ lam
     near = np.array([answer.bound_mm for answer in proven])
     away = abs(assembly.at_junction(x - proven_x)).max(axis=0, initial=0.0)
-    bounds = SAFE * near + (1 + 4 * U) * away
+    bounds = error_bound(away, near)
     bounds = np.where(np.isfinite(bounds), bounds, np.inf)
     return [
         Assessment(
@@ -79,6 +80,11 @@ def assess(
         )
         for k in range(len(loads))
     ]
+
+
+def error_bound(away: Any, near: Any) -> Any:
+    """max|x − x*| or more, mm, of an x that is `away`, as computed, from an answer known to within `near`."""
+    return SAFE * near + (1 + 4 * U) * away
 
 
 @dataclass(frozen=True)

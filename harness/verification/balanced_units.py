@@ -26,7 +26,7 @@ from problems.stiffness import gamma
 from problems.stiffness.block import Block, NotPositiveDefinite
 from problems.stiffness.operator import Stiffness
 
-from .enclosure import SAFE, DoubleDouble, Enclosure, Panel, Residual, exponent, length, row_panels
+from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, Panel, Residual, exponent, length, row_panels
 
 SHARES = (1.0, 0.2, 0.02)  # shares of the guess, tried in turn
 SHARE, STEPS = 0.9, 20  # for AᵀA: share of an estimate from so many steps of the power method
@@ -60,7 +60,7 @@ class Balanced:
     def load(self, loads: Sequence[LoadCase]) -> LoadCase:
         """f' (n, k) or (n, 1), g' (m, k)."""
         both = stacked(loads)
-        return LoadCase(self.D * both.f, self.R * both.g)
+        return LoadCase(_not_lost(self.D * both.f, both.f), _not_lost(self.R * both.g, both.g))
 
     def solve(self, b: Matrix) -> Matrix:
         """K'⁻¹b."""
@@ -126,6 +126,12 @@ class Balanced:
                 entries = panel * D[columns]
                 entries *= D[rows, None]
                 yield rows, columns, entries
+
+
+def _not_lost(scaled: Matrix, value: Matrix) -> Matrix:
+    """Values in other units; one that would underflow to zero is ±η, within the error of a `Residual`."""
+    lost = (scaled == 0) & (value != 0)
+    return np.where(lost, np.copysign(ETA, value), scaled) if lost.any() else scaled
 
 
 def _longest(M: Any) -> int:

@@ -27,7 +27,7 @@ from problems.errors import InputError
 from problems.forms import form_family
 from problems.input.bounded_types import Positive
 from report.document.escape import markdown, quoted
-from report.document.numbers import counted, out_of
+from report.document.numbers import counted, out_of, upwards
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
@@ -232,7 +232,8 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
         case "no_answer":
             why = f"{row['answer']} {UNREADABLE}"
         case "cannot_be_judged":
-            why = f"the reference is known only to {bound:.0e} mm, not to {REFERENCE_SHARE * limit:.0e}"
+            known = f"the reference is known only to {upwards(bound, 1)} mm"
+            why = f"{known}, not to {REFERENCE_SHARE * limit:.0e}"
         case "outside":
             why = f"{judgement.displacement_error_mm:.3e} mm from the reference"
         case _:

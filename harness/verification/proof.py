@@ -202,7 +202,8 @@ class Proof:
         if sharpness is not Sharpness.PLAIN:
             reach = np.minimum(reach, np.sqrt(self.compliance))
         error, rounding = self._energy_norms(lam, r, s, distance)
-        bounds = SAFE * (reach * error + D * away).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
+        least = ETA * (x.hi.any(axis=0) | (error > 0))  # either may underflow in mm
+        bounds = SAFE * (reach * error + D * away).max(axis=0, initial=0.0) + least
         valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
         return np.where(valid, bounds, np.inf), (reach * rounding + D * away).max(axis=0, initial=0.0)
 

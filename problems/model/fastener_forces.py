@@ -2,7 +2,12 @@
 
 An installed fastener is a spring of stiffness k along t = w_a − w_b, set at the approach a: it pulls its
 parts together with preload + k (a − tᵀx), N, and pushes them apart where that is negative. If x is off by at
-most e, the force is by at most k ‖t‖₁ e.
+most e, and t has q entries, the force as computed is off by at most
+
+    k (‖t‖₁ e + γ_{q+4} (|a| + |t|ᵀ|x|)) + γ_4 preload:
+
+a term of tᵀx takes part in q roundings, of its product and of sums, and in those of the difference, of the
+product with k and of the sum with the preload.
 """
 
 from collections.abc import Iterator
@@ -12,10 +17,12 @@ from typing import Any
 import numpy as np
 
 from problems.forms.assembly import Vector
+from problems.stiffness import SAFE, gamma
 
 from .effect import SpringEffect
 from .positions import FORCES, Positions
 from .scene import JointScene, Scene
+from .springs import Springs
 
 
 def fastener_forces(scene: Scene, x: Vector) -> Iterator[dict[str, Any]]:
@@ -36,9 +43,20 @@ def fastener_forces(scene: Scene, x: Vector) -> Iterator[dict[str, Any]]:
             yield {"kind": effect.kind, "pair": list(pair), "x": at_x, "y": at_y, "force_N": force}
 
 
-def force_error_per_mm(scene: Scene) -> float:
-    """max k ‖t‖₁, N/mm: how far forces are off for each mm that x is; 0 without springs."""
-    if not isinstance(scene, JointScene):
+def force_error(springs: Springs, scene: JointScene, x: Vector, error_mm: float) -> float:
+    """How far the forces in the springs of a scene are off at most, N; 0 without springs.
+
+    springs : those of the scene. x : (n,) mm, off by error_mm at most.
+    """
+    if not springs:
         return 0.0
-    springs = (effect.springs(scene.joint) for effect in scene.effects_of(SpringEffect))
-    return max((float((k * abs(T).sum(axis=0)).max()) for T, k in springs), default=0.0)
+    if not np.isfinite(error_mm):
+        return np.inf
+    effects, size = list(scene.effects_of(SpringEffect)), abs(springs.T)
+    a, preload = (
+        max(float(np.max(np.abs(getattr(effect, key)), initial=0.0)) for effect in effects)
+        for key in ("approach", "preload")
+    )
+    rounding = gamma(np.diff(size.indptr) + 4) * (a + size.T @ abs(x))
+    off = springs.k * (size.sum(axis=0) * error_mm + rounding)
+    return float(SAFE * (off.max() + gamma(4) * preload))

@@ -50,9 +50,12 @@ class PartStress:
 
     @property
     def von_mises(self) -> Vector:
-        """(k,) √(σ_xx² − σ_xx σ_yy + σ_yy² + 3 τ_xy²)."""
-        x, y, xy = self.components.T
-        return np.sqrt(x**2 - x * y + y**2 + 3 * xy**2)
+        """(k,) √(σ_xx² − σ_xx σ_yy + σ_yy² + 3 τ_xy²); infinite, never NaN, where it is not known."""
+        scale = abs(self.components).max(axis=1)  # squares of what is above 1e154 overflow
+        with np.errstate(over="ignore", invalid="ignore"):
+            x, y, xy = self.components.T / np.where(scale > 0, scale, 1.0)
+            value = scale * np.sqrt(x**2 - x * y + y**2 + 3 * xy**2)
+        return np.where(np.isnan(value), np.inf, value)
 
 
 def part_stress(
@@ -76,8 +79,8 @@ def part_stress(
     plate, W = model.plate, u.reshape(2 * len(model.plate.y), 2 * len(model.plate.x))
     (x, hx, at_x), (y, hy, at_y) = _line(plate.x), _line(plate.y)
     places = np.column_stack([values.ravel() for values in np.meshgrid(x, y)])
-    thickness = np.full(len(places), plate.thickness)
-    for pad, x_range, y_range in (effect.pad for effect in model.effects if effect.pad):
+    thickness, pads = np.full(len(places), plate.thickness), [e.pad for e in model.effects if e.pad]
+    for pad, x_range, y_range in pads:
         low, high = np.transpose([x_range, y_range])
         thickness[((low <= places) & (places <= high)).all(axis=1)] = pad
     bent = sum((load.free_curvature(thickness) for load in loads), start=np.zeros(len(places)))
@@ -86,7 +89,8 @@ def part_stress(
     nu, E = plate.poisson, plate.young
     scale = E * thickness / 2 / (1 - nu**2)
     components = scale[:, None] * np.column_stack([of_xx + nu * of_yy, of_yy + nu * of_xx, (1 - nu) * of_xy])
-    rigidity = E * thickness.min() ** 3 / (12 * (1 - nu**2))
+    thinnest = min([plate.thickness, *(pad for pad, _, _ in pads)])  # also between the points
+    rigidity = E * thinnest**3 / (12 * (1 - nu**2))
     areas = np.multiply.outer(hy, hx).ravel()
     s = sum((2 * k + 1) * np.polynomial.legendre.Legendre.basis(k)(GAUSS[0]) ** 2 for k in range(4))
     sensitivity = scale * np.sqrt(max(1.0, 1.5 * (1 - nu)) * s**2 / (areas * rigidity))

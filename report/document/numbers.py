@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from decimal import Context, Decimal
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,21 @@ def significant(value: object, digits: int = 3) -> str:
     if not -3 <= exponent < 5:
         return power(number, digits)
     return f"{rounded:.{max(0, digits - 1 - exponent)}f}"
+
+
+def raised(bound: object, digits: int = 3) -> float | None:
+    """A bound rounded upwards to so many digits, so that what is printed is no less; None without one."""
+    number = as_number(bound)
+    if not number:
+        return number
+    nearest = Decimal(f"{number:.{digits - 1}e}")
+    return float(nearest if float(nearest) >= number else nearest.next_plus(Context(prec=digits)))
+
+
+def upwards(bound: float, digits: int = 2) -> str:
+    """3.3e-16: a bound above 3.2e-16, never less than it is."""
+    shown = raised(bound, digits)
+    return f"{bound if shown is None else shown:.{digits - 1}e}"
 
 
 def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:

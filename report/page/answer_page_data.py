@@ -2,7 +2,16 @@
 
 import pandas as pd
 
-from report.document.numbers import coordinate, listed, out_of, position, significant, without_rounding
+from report.document.numbers import (
+    coordinate,
+    listed,
+    out_of,
+    position,
+    raised,
+    significant,
+    upwards,
+    without_rounding,
+)
 from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
 from report.page.page_figures import map_item
 from report.page.page_file import Data, banner
@@ -48,8 +57,8 @@ def facts(record: Data) -> list[list[str]]:
         "verdict at 1e-7 mm": record.get("verdict"),
         "solver's report": record.get("status"),
         "judged error, mm": record.get("judged_error_mm"),
-        "error bound, mm": record.get("error_bound_mm"),
-        "gaps proven to, mm": (record.get("allowed_gap") or {}).get("uncertainty_mm"),
+        "error bound, mm": raised(record.get("error_bound_mm")),
+        "gaps proven to, mm": raised((record.get("allowed_gap") or {}).get("uncertainty_mm")),
         "mesh error, mm (estimated)": (record.get("grid") or {}).get("error_mm"),
         "memory, MiB": record.get("peak_rss_mib"),
         **{f"{step}, s": seconds for step, seconds in record.get("steps", {}).items()},
@@ -92,7 +101,8 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
     near = ", closer to the limit than the mesh can tell" if check.get("closer_than_grid_mm") else ""
     near += f"; {check['beyond_scan']}" if "beyond_scan" in check else ""
     if check["exceeded"] is None:
-        kind, verdict = "", f"CANNOT BE TOLD: {limit}, gaps are proven to {check['uncertainty_mm']:.1e} mm"
+        known = f"gaps are proven to {upwards(check['uncertainty_mm'])} mm"
+        kind, verdict = "", f"CANNOT BE TOLD: {limit}, {known}"
     elif check["exceeded"]:
         larger = f"at {out_of(len(check['contacts']), record['m'], 'contact')}"
         where = f"{larger}, {check['share']:.1%} of the junction, between {', '.join(check['pairs'])}"

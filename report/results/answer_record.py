@@ -59,9 +59,12 @@ def stresses(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
 
 
 def von_mises(arrays: dict[str, Array]) -> Array:
-    """(k,) von Mises' stress at the places of `stress`, N/mm²."""
-    xx, yy, xy = arrays["stress"].T
-    return np.asarray(np.sqrt(xx**2 - xx * yy + yy**2 + 3 * xy**2))
+    """(k,) von Mises' stress at the places of `stress`, N/mm²; infinite where it is not known."""
+    scale = abs(arrays["stress"]).max(axis=1)  # squares of what is above 1e154 overflow
+    with np.errstate(over="ignore", invalid="ignore"):
+        xx, yy, xy = arrays["stress"].T / np.where(scale > 0, scale, 1.0)
+        value = scale * np.sqrt(xx**2 - xx * yy + yy**2 + 3 * xy**2)
+    return np.where(np.isnan(value), np.inf, value)
 
 
 def stress_map(arrays: dict[str, Array], part: int) -> tuple[Array, Array, Any]:

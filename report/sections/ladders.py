@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from harness.results.schema import LADDERS, OWNERS
 from report.document.blocks import Block, Figure, Section, Table, Text, number, records, word
-from report.document.numbers import as_number, out_of, power, whole
+from report.document.numbers import as_number, out_of, power, raised, whole
 from report.figures.line_charts import Cell, Group, grid
 from report.figures.style import BLUE, VERMILLION
 from report.results.reader import Results
@@ -177,7 +177,7 @@ def rungs(results: Results) -> Section | None:
     columns += [
         number("cond(K)", "cond_K", power),
         number("limit, mm", "limit_mm", power),
-        number("reference error bound, mm", "reference_bound_mm", power),
+        number("reference error bound, mm", "reference_bound_mm", lambda e: power(raised(e))),
     ]
     blocks: list[Block] = [
         Table("rungs", "*The measured rungs.* Bound 0: the reference is exact.", taken, columns)

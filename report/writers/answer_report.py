@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
-from report.document.numbers import coordinate, extent, significant, whole
+from report.document.numbers import coordinate, extent, raised, significant, whole
 from report.figures.answer_maps import answer_figures
 from report.figures.node_cells import grid_of
 from report.page.answer_page_data import answer_data, facts, headline
@@ -108,7 +108,7 @@ def _proven(record: dict[str, Any]) -> str:
     if bound is not None:
         whose = "The reference" if record["judged_error_mm"] is not None else "Every displacement"
         whose += " of the last stage, at the approaches locked before," if "stages" in record else ""
-        text = f"{whose} is within **{significant(bound)} mm** of the exact solution (proven bound)."
+        text = f"{whose} is within **{significant(raised(bound))} mm** of the exact solution (proven bound)."
     if record["qp"]:
         return text
     why = "the scene has no contact"

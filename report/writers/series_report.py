@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 from report.analysis.checks import code_warnings
 from report.document.blocks import Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import file_name
-from report.document.numbers import counted, out_of, significant, tidy_power
+from report.document.numbers import counted, out_of, raised, significant, tidy_power
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.page.contact_maps import hover_names, map_controls, series_maps
@@ -100,11 +100,11 @@ def _summary(series: Series) -> Table:
         bounds, checked = cases["bound_mm"].dropna(), cases["displacement_error_mm"].dropna()
         largest, seconds = cases["max_gap_mm"], cases[list(STEPS)]
         rate = significant(len(cases) / float(seconds.sum().sum()))
-        compared = counted(len(checked), "case")
+        compared, bound = counted(len(checked), "case"), significant(raised(bounds.max()))
         summary |= {
             "largest gap left": _largest(series),
             "median of the largest gaps": f"{significant(largest.median())} mm",
-            "proven error bound": f"{significant(bounds.max())} mm, {len(cases) - len(bounds)} unproven",
+            "proven error bound": f"{bound} mm, {len(cases) - len(bounds)} unproven",
             "error beside the reference": f"{significant(checked.max())} mm, {compared} compared",
             "speed": f"{rate} cases per second of work",
         }

@@ -14,7 +14,7 @@ from matplotlib.image import imread
 
 from report.document.blocks import Table, records
 from report.document.escape import plain
-from report.document.numbers import as_number, significant
+from report.document.numbers import as_number, raised, significant
 from report.document.verdict_colours import COLOURS, FAIL
 from report.figures import style
 from report.page.page_file import minute
@@ -78,7 +78,7 @@ def exactness(error_mm: Any) -> str:
     """How exact the calculation is, in a sentence. error_mm : a bound, if there is one."""
     if as_number(error_mm) is None:
         return "How exact the calculation is could not be shown."
-    error = f"{FINEST:f}" if error_mm <= FINEST else significant(error_mm, 2)
+    error = f"{FINEST:f}" if error_mm <= FINEST else significant(raised(error_mm, 2), 2)
     return f"The calculation is exact to {error} mm for this model."
 
 

@@ -1,6 +1,7 @@
 """The public interface: what it gives is what the commands give, and what it refuses it names."""
 
 import tomllib
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,10 @@ def test_solutions_are_the_independent_answer(solver: str | None, form: Any) -> 
     assert abs(solution.x - x).max() <= solution.error_bound_mm + 1e-11
     assert (solution.iterations is None) == (solver is None)
     assert 0 < solution.error_bound_mm < (1e-11 if solver is None else 1e-7)
+    away, near = solution.judgement.displacement_error_mm, solution.problem.reference.bound_mm
+    assert away is not None
+    rounded = (1 + 4 * Fraction(2) ** -53) * Fraction(away)  # of the distance as computed
+    assert Fraction(solution.error_bound_mm) >= rounded + Fraction(near)
 
 
 def test_an_x_from_elsewhere_is_judged() -> None:

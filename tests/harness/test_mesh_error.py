@@ -77,6 +77,15 @@ def test_gaps_that_no_mesh_moves_leave_nothing_out() -> None:
     assert estimated(found, refine=True).error_mm < 1e-12
 
 
+def test_gaps_that_a_coarser_mesh_does_not_see_count() -> None:
+    """Closed on every second line, 0.05 mm between: at the nodes of the coarser mesh nothing moves."""
+    x, y = np.meshgrid(np.linspace(0, 300, 21), np.linspace(0, 60, 5))
+    between = np.logical_or(*np.indices(x.shape) % 2)
+    points = np.column_stack([x.ravel(), y.ravel(), 0.05 * between.ravel()]).tolist()
+    found = solve({"joint": STRIPS, "effect": [{"kind": "measured_gap", "points": points}]}, form="sparse")
+    assert estimated(found).error_mm == pytest.approx(0.05)
+
+
 def test_a_mesh_without_an_answer_costs_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     found = strips(*PLANS["pressure"])
     monkeypatch.setattr("harness.scene.mesh_error.candidate_forces", lambda *_: iter(()))

@@ -533,6 +533,17 @@ def test_workers_that_were_killed_are_said(
     assert len(AnswerJournal(study, tmp_path / PLANS, {"a": 1}, None).answers) == 1
 
 
+def test_figures_without_a_bound_are_read_again(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """JSON has no infinity: a resumed search compared None with a limit."""
+    study, question = study_of(strip), Question(((),), (0,))
+    unproven = Outcome((np.inf,), (2,), (np.inf,), ((0.1, np.inf),), ((0.0, 0.2),))
+    monkeypatch.setattr("harness.placement.answer_journal.answer", lambda _: [unproven])
+    assert AnswerJournal(study, tmp_path / PLANS, {"a": 1}, None)([question]) == [[unproven]]
+    assert AnswerJournal(study, tmp_path / PLANS, {"a": 1}, None)([question]) == [[unproven]]
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_report", "without_pictures")
 def test_workers_find_the_same(strip: Path, tmp_path: Path, whole: tuple[Path, str], cluster: Any) -> None:

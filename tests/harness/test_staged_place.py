@@ -6,6 +6,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from commands import harness
 from small_joints import STAGED
@@ -16,7 +17,7 @@ from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, without_fasteners
 from harness.placement.plan_search import Step
 from harness.placement.search import Search
-from harness.placement.session import FastenerStudy, PlanSession, Question
+from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question
 from harness.results import series_file
 from harness.scene.scene_file import MOVED, edited, with_fasteners
 from harness.terminal.console import console_of
@@ -67,6 +68,22 @@ def test_a_plan_leaves_what_the_last_stage_leaves(path: Path, form: Form) -> Non
         assert estimated.largest == pytest.approx(outcome.largest, abs=1e-6)
     stages = session.stages.stages.values()
     assert len({id(stage.session) for stage in stages}) == 3  # of K: none, two and three rivets
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+def test_fasteners_lock_the_answer_that_is_proven(path: Path, form: Form) -> None:
+    """To the last bit: another sum for the approach may be off by more than the bound of that answer."""
+    movable = MovableFasteners.of(read_scene(str(path)))
+    cases = random_gaps(movable.bare, CASES, 0, form=form)
+    session = PlanSession(FastenerStudy(movable.bare, cases, form, movable))
+    stages = session.answers([movable.current], range(CASES), TOLERANCE_MM)
+    (rivets,) = (effect for effect in movable.scene.effects if effect.name == "rivets")
+    T, _ = rivets.springs(movable.scene.joint)  # type: ignore[attr-defined]
+    locking = [k for k, one in enumerate(stages) if one.locks]
+    for k, own in zip(locking, ([0, 1], [2]), strict=True):
+        x = np.column_stack([answer.x for answer in stages[k].proven])
+        reached = T.T @ stages[k].session.data.assembly.at_junction(x)
+        np.testing.assert_array_equal(stages[k + 1].approaches[own], reached[own])
 
 
 def test_a_stage_that_locks_what_is_not_proven_proves_no_plan(

@@ -4,6 +4,7 @@ import csv
 import json
 import runpy
 import tomllib
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from commands import harness
 from superelements import flat, stiffnesses, two_plates, write_part
 
+from harness import solve
+from harness.scene.answer_record import arrays_of, recorded
 from problems.scene_files import read_scene
 
 
@@ -159,3 +162,41 @@ def test_the_example_is_solved_and_made_again(tmp_path: Path) -> None:
     with np.load(example / "wing.npz") as stored:
         np.testing.assert_allclose(K, stored["K"], atol=1e-9 * abs(K).max())
     assert len(nodes) == len((example / "wing.csv").read_text().splitlines()) - 1
+
+
+def write_tilted(folder: Path, normal: tuple[float, float], dofs: list[int]) -> Path:
+    """A part of 3 x 3 nodes whose normals have these x and y, pressed against a tool."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 41, 20), np.arange(0.0, 41, 20)))
+    tilt = np.array([*normal, np.sqrt(1 - np.dot(normal, normal))])
+    K = np.eye(9 * len(dofs)) + 0.1
+    write_part(folder, "a", K, flat(np.column_stack([x, y])), np.tile(tilt, (9, 1)), dofs=dofs)
+    rows = 'rows = "table"\n' if len(dofs) > 1 else ""
+    part = f'[[joint.part]]\nname = "a"\nsuperelement = "a.npz"\nnodes = "a.csv"\ndofs = {dofs}\n{rows}'
+    effects = '[[effect]]\nkind = "initial_gap"\nmean = 0.05\n[[effect]]\nkind = "pressure"\n'
+    text = f'[joint]\ncontacts = [["a", "tool"]]\n{part}{effects}part = "a"\nvalue = 1e-3\n'
+    (folder / "scene.toml").write_text(text)
+    return folder / "scene.toml"
+
+
+def test_the_bound_is_that_of_the_displacements_shown(tmp_path: Path) -> None:
+    """Along inclined normals they are sums of three unknowns, rounded."""
+    answer = solve(str(write_tilted(tmp_path, (0.1, 0.05), [1, 2, 3])))
+    bound, away = Fraction(answer.problem.reference.bound_mm), list[Fraction]()
+    shown = answer.problem.scene.joint.shown  # type: ignore[attr-defined]
+    for row, value in zip(shown.toarray(), arrays_of(answer)["x"], strict=True):
+        terms = [(Fraction(d), Fraction(answer.x[k])) for k, d in enumerate(row) if d]
+        off = abs(Fraction(value) - sum(d * x for d, x in terms))
+        away.append(off + bound * sum(abs(d) for d, _ in terms))
+    assert bound < max(away) <= recorded(answer, set(), None)["error_bound_mm"] <= 50 * max(away)
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_an_answer_along_inclined_normals_is_judged_by_its_unknowns(tmp_path: Path) -> None:
+    """One unknown per node, which is not the displacement that nodes.csv has."""
+    scene, out = write_tilted(tmp_path, (0.04, 0.0), [3]), tmp_path / "out"
+    assert harness("solve", scene, "--out", out).exit_code == 0
+    done = harness("judge", out / "solution.npz", scene)
+    assert done.exit_code == 0, done.output
+    done = harness("judge", out / "nodes.csv", scene)
+    assert (done.exit_code, "`unknowns` of solution.npz" in " ".join(done.stderr.split())) == (2, True)
+    assert harness("judge", out / "contacts.csv", scene).exit_code == 0

@@ -11,6 +11,7 @@ from rich.console import Console
 from suite_runs import said_by
 
 from harness.measurement.suite_run import summary as summary_of_run
+from harness.scene.answer_record import summary as said_of
 from harness.scene.solve import solve_into
 from harness.series.run import summary
 
@@ -49,19 +50,28 @@ def test_solve_says_what_was_proven_and_that_K_was_symmetrised(off: float, tmp_p
     assert ("was replaced by (K + Kᵀ)/2." in text) == bool(off)
 
 
+def test_solve_says_no_less_than_what_was_proven() -> None:
+    record = {"digits": None, "skipped": [], "judged_error_mm": None, "error_bound_mm": 3.21e-16}
+    about = {"method": "newton, refined", "status": "solved", "verdict": "within"}
+    ((said, _),) = said_of(record | about)
+    assert said == "newton, refined: every displacement within 3.3e-16 mm, proven."
+    ((said, _),) = said_of(record | about | {"judged_error_mm": 1e-9})
+    assert "1.0e-09 mm from the answer with a proven bound (3.3e-16 mm)" in said
+
+
 def test_a_series_says_how_many_bounds_are_missing() -> None:
     """An infinite bound is null in the rows of a series."""
     console = Console(file=StringIO(), width=200)
-    rows: list[Any] = [{"verdict": "within", "bound_mm": 1e-9}, {"verdict": "no_answer"}]
+    rows: list[Any] = [{"verdict": "within", "bound_mm": 1.21e-9}, {"verdict": "no_answer"}]
     summary(rows, 2, console)
     summary([*rows, {"verdict": "cannot_be_judged", "bound_mm": None}], 3, console)
     first, *_, last = (line for line in console.file.getvalue().splitlines() if "bound" in line)
-    assert "largest proven error bound 1.0e-09 mm" in first
+    assert "largest proven error bound 1.3e-09 mm" in first
     assert "some bounds could not be proven" in last
 
 
 @pytest.mark.parametrize(
-    ("bound", "said"), [(3e-7, "the references are proven to 3e-07 mm"), (None, "no reference is proven")]
+    ("bound", "said"), [(3.2e-7, "the references are proven to 4e-07 mm"), (None, "no reference is proven")]
 )
 def test_a_run_whose_answers_cannot_be_judged_says_so(bound: float | None, said: str) -> None:
     console = Console(file=StringIO(), width=200)

@@ -1,6 +1,7 @@
 """Each effect's one term: gaps, forces at the junction, files of positions."""
 
 import tracemalloc
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from small_joints import JOINT, PART, make_joint, make_scene
 from problems.effects.clamps import Clamps
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import SHIFT, InitialGap, square_root
+from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.measured_gap import MeasuredGap
 from problems.effects.part_position import PartPosition
 from problems.effects.pressure import Pressure
@@ -21,9 +23,10 @@ from problems.effects.shims import Shims
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.model.effect import ForceEffect, PartEffect, StiffnessEffect
-from problems.model.fastener_forces import fastener_forces
+from problems.model.fastener_forces import fastener_forces, force_error
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
+from problems.model.springs import Springs
 
 POINT = st.tuples(st.floats(0, 400), st.floats(0, 120))
 THREE = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, nodes=(9, 5))
@@ -319,3 +322,22 @@ def test_a_preload_elsewhere_than_at_points_is_no_fastener() -> None:
     fasteners = Fasteners(kind="fasteners", preload=(5.0, 7.0), points=((10.0, 10.0), (90.0, 10.0)))
     entries = fastener_forces(make_scene(JOINT, press, fasteners), np.zeros(JOINT.size[0]))
     assert [entry["force_N"] for entry in entries] == [5.0, 7.0]
+
+
+def test_the_error_of_a_spring_s_force_is_that_of_x_and_of_rounding() -> None:
+    """Against fractions, of an x that is exact, and of one that is off by a known error."""
+    points = ((50.0, 30.0), (200.0, 60.1), (333.3, 10.0))
+    rivets = InstalledFasteners(
+        kind="installed_fasteners", stiffness=1e5 / 3, approach=0.7, preload=0.1, points=points
+    )
+    scene, x = make_scene(JOINT, rivets), np.random.default_rng(0).standard_normal(JOINT.size[0])
+    springs, off = Springs.of(scene), []
+    for j, found in enumerate(fastener_forces(scene, x)):
+        t = springs.T[:, j].toarray().ravel()
+        reached = sum(Fraction(t[i]) * Fraction(x[i]) for i in np.flatnonzero(t))
+        exact = Fraction(0.1) + Fraction(springs.k[j]) * (Fraction(0.7) - reached)
+        off.append(abs(Fraction(found["force_N"]) - exact))
+    assert 0 < max(off) <= force_error(springs, scene, x, 0.0) < 1e-9
+    assert 1e5 / 3 * 2e-3 <= force_error(springs, scene, x, 1e-3) <= 1.02 * 1e5 / 3 * 2e-3
+    assert force_error(springs, scene, x, np.inf) == np.inf
+    assert force_error(Springs.of(make_scene(JOINT)), make_scene(JOINT), x, 1e-3) == 0

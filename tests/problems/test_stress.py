@@ -1,6 +1,7 @@
 """Stresses of plates against closed forms (Timoshenko and Woinowsky-Krieger 1959), and their errors."""
 
 import json
+from itertools import pairwise, product
 from pathlib import Path
 
 import meshio
@@ -13,7 +14,7 @@ from scipy.sparse.linalg import spsolve
 from small_joints import degrees
 
 from harness.scene.solution import solve
-from harness.scene.stress import stresses, stresses_of
+from harness.scene.stress import Stresses, largest_of, stress_record, stresses, stresses_of
 from harness.verification.reference import proof_of
 from problems.effects.local_thickness import LocalThickness
 from problems.effects.thermal_bending import ThermalBending
@@ -25,6 +26,7 @@ from problems.model.plate import Plate, line_loads
 from problems.model.stress import PartStress, part_stress
 from problems.scene_files import SCENES, read_scene
 from report.figures.answer_maps import answer_figures
+from report.results.answer_record import von_mises as answer_von_mises
 
 NOWHERE = np.zeros((0, 2))
 E, NU, T, SIDE, Q = 70e3, 0.3, 2.0, 100.0, 0.01
@@ -154,6 +156,45 @@ def test_no_error_changes_a_stress_by_more_than_its_energy_allows(pad: float | N
             e[free] = values
             shares.append(changed(e).max())
     assert 0.05 < max(shares) <= 1.0
+
+
+def test_a_thin_place_between_the_gauss_points_counts() -> None:
+    """K has it: σ = s u changes by up to √(s K⁺ sᵀ) per unit of energy. Thick at the points alone."""
+    lines, cuts = np.array([0.0, 2.0]), (0.0, 0.40, 0.44, 1.56, 1.60, 2.0)
+    thick = [(0.40, 0.44), (1.56, 1.60)]
+    thin = [cell for cell in product(pairwise(cuts), repeat=2) if not {*cell} <= {*thick}]
+    pads = tuple(
+        LocalThickness(kind="local_thickness", part="p", thickness=T / 10, x=x, y=y) for x, y in thin
+    )
+    model, units = PartModel(Plate(lines, lines, T, E, NU), pads, range(2)), np.eye(16)
+    s = np.array([part_stress("p", model, (), unit, NOWHERE).components for unit in units])
+    compliance = np.linalg.pinv(model.stiffness().toarray(), rcond=1e-12, hermitian=True)
+    most = np.sqrt(np.einsum("ikc,ij,jkc->kc", s, compliance, s))
+    assert (most.max(axis=1) <= part_stress("p", model, (), units[0], NOWHERE).sensitivity).all()
+
+
+def made(*components: tuple[float, float, float], error: float = 0.0) -> Stresses:
+    """Stresses of one part."""
+    k = len(components)
+    about = np.ones(k), np.zeros(k, dtype=bool), np.zeros(k, dtype=np.intp)
+    part = PartStress("plate", np.zeros((k, 2)), np.array(components), *about)
+    return Stresses((part,), (np.full(k, error),))
+
+
+def test_a_stress_that_overflows_passes_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 3e200 and 1e200 the squares overflow, √7 · 1e200 does not; what is not known is no PASS either."""
+    large = made((1.0, 0.0, 0.0), (3e200, 1e200, 0.0), (0.0, 0.0, 0.0))
+    np.testing.assert_allclose(large.parts[0].von_mises, [1.0, np.sqrt(7) * 1e200, 0.0], rtol=1e-14)
+    np.testing.assert_array_equal(answer_von_mises(large.arrays), large.parts[0].von_mises)
+    assert (large.exceeded(100.0), made((1.0, 0.0, 0.0)).exceeded(100.0)) == (True, False)
+    assert made((1.0, 0.0, 0.0), error=np.nan).exceeded(100.0) is None
+    for unknown in (np.inf, np.nan):
+        found = made((1.0, 0.0, 0.0), (unknown, -unknown, 0.0))
+        assert found.largest["von_mises"] == np.inf
+        record = stress_record(found, None, 100.0)
+        assert (record["exceeded"], record["kind"]) == (None, "")
+        monkeypatch.setattr("harness.scene.stress.stresses_of", lambda *_, of=found: of.parts)
+        assert largest_of(read_scene("gallery/padded-panel"), np.zeros(1)) == np.inf  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["three-part-stack", "padded-panel", "heavy-sheet-on-tool"])

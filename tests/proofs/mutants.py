@@ -79,6 +79,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         " * np.repeat(D[rows], np.diff(panel.indptr))": ("",),
         "self.D * both.f": ("both.f",),
         "self.R * both.g": ("both.g",),
+        "np.where(lost, np.copysign(ETA, value), scaled)": ("scaled",),
         "float((self.assembly.K.absolute_sums(D) * D).max(initial=0.0))": (
             "float(self.assembly.K.absolute_sums(D).max(initial=0.0))",
         ),
@@ -132,7 +133,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "(reach * error + D * away / 2)",
             "(reach * error + away)",
         ),
-        " + ETA * x.hi.any(axis=0)": ("",),
+        "ETA * (x.hi.any(axis=0) | (error > 0))": ("0.0", "ETA * x.hi.any(axis=0)"),
         " & ~(lam.hi < 0).any(axis=0)": ("",),
         "np.where(valid, bounds, np.inf), (reach": ("bounds, (reach",),
         "np.where(C, At @ dx - y, 0.0)": ("np.where(C, -y, 0.0)",),
@@ -245,6 +246,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "self.last.data, np.zeros(": ("self.last.data, -1e-4 * np.ones(",),
         "(stage.springs.k[:, None] * approaches)": ("(0 * approaches)",),
         " - overlap.T @ self.vectors[0]": (" + overlap.T @ self.vectors[0]",),
+        "if self.tolerance <= TOLERANCE_MM": ("if False",),
         "> LIMIT_MM).any(axis=0), np.inf": ("> LIMIT_MM).any(axis=0), 0.0",),
     },
     "harness/placement/plan_search.py": {
@@ -264,7 +266,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "(held >= 0 and asking[held].any())": ("False",),
     },
     "harness/shimming/study.py": {
-        "force_error_per_mm(scene) * answer.bound_mm": ("-1e-3",),
+        "force_error(Springs.of(scene), scene, at, answer.bound_mm)": ("-1e-3",),
         "if answer.bound_mm else 0.0": ("if False else -1.0",),
         "at <= 0.5), mask": ("at < 0.5), mask",),
         "at >= 0.5)": ("at > 0.5)",),
@@ -345,6 +347,9 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
             "k * (self.approach + T.T @ x) + np.resize(self.preload, len(k))",
         ),
     },
+    "problems/model/fastener_forces.py": {
+        "size.sum(axis=0) * error_mm + rounding": ("size.sum(axis=0) * error_mm", "rounding"),
+    },
     "problems/model/joint_model.py": {
         "self.springs.key(key) if self.springs else key\n        like": ("key\n        like",),
     },
@@ -366,6 +371,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "of_xx + nu * of_yy": ("of_xx - nu * of_yy", "of_xx"),
         "(1 - nu) * of_xy": ("of_xy",),
         "thickness[((low <= places)": ("thickness[((low > places)",),
+        "min([plate.thickness, *(pad for pad, _, _ in pads)])": ("thickness.min()",),
         "max(1.0, 1.5 * (1 - nu)) * s**2": ("0.001 * s**2",),
         "x**2 - x * y + y**2": ("x**2 + y**2",),
     },
@@ -446,6 +452,7 @@ TESTS = {
         "proofs/test_fuzz_exact.py",
     ),
     "problems/model/effect.py": ("problems/test_stages.py",),
+    "problems/model/fastener_forces.py": ("problems/test_effects.py",),
     "problems/model/joint_model.py": ("problems/test_stages.py",),
     "problems/model/stage_answers.py": ("problems/test_stages.py",),
     "problems/model/stages.py": ("problems/test_stages.py",),

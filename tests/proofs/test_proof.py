@@ -239,6 +239,19 @@ def test_an_answer_that_underflows_is_rounded(kind: Any) -> None:
 
 
 @KINDS
+@pytest.mark.parametrize(("f", "g", "exact"), [(1, 2**50, Fraction(1, 2**40)), (0, -1, Fraction(-1, 2**30))])
+def test_a_load_that_underflows_in_its_unit_is_not_lost(kind: Any, f: int, g: int, exact: Fraction) -> None:
+    """f, g and x* in units of η: a force on a stiff spring, and an overlap in a unit of its own."""
+    proof, _ = springs(kind, 2.0**40, A=[[2.0**30]])
+    eta = 2.0**-1074
+    assert not (proof.balanced.D * eta).any()
+    assert not (proof.balanced.R * eta).any()
+    (found,) = proof.proven([LoadCase(array(f * eta), array(g * eta))], [array(0.0)])
+    off = abs(Fraction(float(found.x.hi[0])) - exact * Fraction(eta))
+    assert off <= Fraction(found.bound_mm) <= 2.0**-1060
+
+
+@KINDS
 def test_the_norm_of_K_is_in_balanced_units(kind: Any) -> None:
     assert 1.0 <= springs(kind, 4.0, 2.0**40, exact=False)[0].balanced.stiffest <= 1.02
 

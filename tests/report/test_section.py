@@ -11,7 +11,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from report.document.blocks import Table, number, word
-from report.document.numbers import coordinate, extent, position, significant
+from report.document.numbers import coordinate, extent, position, raised, significant, upwards
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.page.answer_page_data import headline
@@ -169,6 +169,31 @@ def test_places_are_rounded_by_the_size_of_the_part_and_a_gap_of_rounding_is_zer
     assert position(nodes[0] / 1e3, nodes / 1e3) == "(1.0779, 0) mm"
     assert extent(np.array([-1.1e-16, 0.73])) == "0 … 0.730"
     assert extent(np.array([-1.1e-6, 0.73])) == "-1.10e-6 … 0.730"
+
+
+@pytest.mark.parametrize(
+    ("bound", "digits", "said"),
+    [
+        (3.21e-16, 2, "3.3e-16"),
+        (3.2e-16, 2, "3.2e-16"),
+        (9.91e-17, 2, "1.0e-16"),
+        (1.01e-3, 1, "2e-03"),
+        (4.0011, 4, "4.002e+00"),
+        (0.0, 2, "0.0e+00"),
+        (np.inf, 2, "inf"),
+    ],
+)
+def test_a_bound_is_printed_no_less_than_it_is(bound: float, digits: int, said: str) -> None:
+    assert upwards(bound, digits) == said
+
+
+def test_no_bound_is_rounded_down_or_far() -> None:
+    for bound in 10 ** np.random.default_rng(0).uniform(-20, 4, 300):
+        for digits in range(1, 5):
+            for said in (upwards(bound, digits), significant(raised(bound, digits), digits)):
+                assert bound <= float(said) <= bound * (1 + 1.001 * 10.0 ** (1 - digits))
+    assert exactness(1.241e-3) == "The calculation is exact to 0.0013 mm for this model."
+    assert (raised(None), raised(np.inf)) == (None, None)
 
 
 def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:
