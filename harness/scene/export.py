@@ -22,7 +22,7 @@ from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
 from harness.planning.suite import read_suite
-from harness.results.atomic_output import atomic_output, refuse_unwritable
+from harness.results.atomic_output import PROGRAM, atomic_output, refuse_unwritable
 from harness.results.provenance import fingerprints
 from harness.results.records import replace_text
 from harness.terminal.console import console_of
@@ -180,7 +180,8 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
     for name, M in arrays.items():
         matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
         formats.matrix_text.write_one(path / f"{name}.mtx", matrix, "general")
-    (path / "about.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")
+    about = about | {"files": sorted([PROGRAM, *(f"{name}.mtx" for name in arrays)])}
+    (path / PROGRAM).write_text(json.dumps(about, indent=1) + "\n", "utf-8")
 
 
 def _write_mps(path: Path, arrays: Arrays, about: Arrays) -> None:

@@ -1,5 +1,6 @@
 """`export --form` and `judge`: problems to other programs, bit for bit, and their answers back."""
 
+import json
 import runpy
 import shutil
 import subprocess
@@ -60,6 +61,31 @@ def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Pa
         assert np.array_equal(files["h"], problem.h(load))
     assert float(files["limit_mm"][0]) == 1e-7
     assert 0 < float(files["bound_mm"][0]) < 1e-9
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_another_program_takes_the_place_of_the_first(listed: bool, scenes: Path, tmp_path: Path) -> None:
+    """Readers tell forms apart by their files; a file of the user stays.
+
+    listed : whether about.json names the files of the first, which version 0.3.0 did not.
+    """
+    out, words = tmp_path / "p", ("export", scenes / "tiny.npz", "--form")
+    assert harness(*words, "primal", "--with-reference", "--out", out).exit_code == 0
+    (out / "mine.txt").write_text("mine")
+    about = json.loads((out / "about.json").read_text())
+    names = about["files"] if listed else about.pop("files")
+    assert sorted(path.name for path in out.iterdir()) == sorted(["mine.txt", *names])
+    (out / "about.json").write_text(json.dumps(about))
+    assert harness(*words, "dual", "--out", out).exit_code == 0
+    assert {path.name for path in out.iterdir()} == {"P.mtx", "q.mtx", "lb.mtx", "about.json", "mine.txt"}
+
+
+def test_a_record_of_another_program_names_nothing_to_remove(scenes: Path, tmp_path: Path) -> None:
+    (tmp_path / "about.json").write_text('{"files": ["mine.mtx"]}')
+    (tmp_path / "mine.mtx").write_text("mine")
+    asked = ("export", scenes / "tiny.npz", "--form", "dual", "--out", tmp_path)
+    assert harness(*asked).exit_code == 0
+    assert (tmp_path / "mine.mtx").read_text() == "mine"
 
 
 def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: Path) -> None:
