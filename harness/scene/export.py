@@ -3,11 +3,12 @@
     min ½zᵀPz + qᵀz   subject to   Gz ≤ h     primal: z = x, n displacements, mm; sparse: z = û, N unknowns
                                    z ≥ lb     dual: z = λ, m contact forces, N
 
-The arrays are P, q, and G, h or lb; with the reference also x (mm), lam (the multipliers of Gz ≤ h, N),
-bound_mm, the proven bound on max|x − x*|, and limit_mm, the largest error that an answer may have. They are
-written as a folder of Matrix Market files, one per array and with 17 digits, or as one .npz; about.json, or
-the texts in the .npz, name the problem. MPS has P, q, G, h, lb. The programs of a suite are a test set of
-qpbenchmark, a Parquet file.
+The arrays are P, q, and G, h or lb; with the reference also x, lam (the multipliers of Gz ≤ h), unit_mm, the
+length of one unit of each x, bound_mm, the proven bound on max|x − x*|·unit_mm, and limit_mm, the largest
+error that an answer may have. Units are mm and N but on rungs in others. They are written as a folder of
+Matrix Market files, one per array and with 17 digits, or as one .npz; about.json, or the texts in the .npz,
+name the problem. MPS has P, q, G, h, lb. The programs of a suite are a test set of qpbenchmark, a Parquet
+file.
 """
 
 import json
@@ -162,7 +163,8 @@ def _program(scene: Scene, form: Form, with_reference: bool, limit_s: float | No
         arrays |= {"G": problem.G, "h": problem.h(load)}
     if with_reference:
         reference, limit_mm = judged.reference, judged.limit_mm(LIMIT_MM)
-        arrays |= {"x": reference.x, "lam": reference.lam}
+        unit_mm = np.full(reference.x.shape, reference.unit_mm)
+        arrays |= {"x": reference.x, "lam": reference.lam, "unit_mm": unit_mm}
         arrays |= {"bound_mm": np.array([reference.bound_mm]), "limit_mm": np.array([limit_mm])}
     about = {"scene": scene.name, "title": scene.title, "scene_key": scene.key, "form": form}
     return arrays, about | {"n": problem.assembly.n, "m": problem.assembly.m}

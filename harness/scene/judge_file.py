@@ -71,8 +71,8 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
     """The judge's figures, and where the largest error is."""
     error, bound = judgement.displacement_error_mm or 0.0, problem.reference.bound_mm
     assembly = problem.prepared.assembly
-    nodes, away = assembly.at_junction(assembly.nodes), assembly.at_junction(abs(x - problem.reference.x))
-    worst = int(np.argmax(away))
+    away = abs(x - problem.reference.x) * problem.reference.unit_mm
+    nodes, worst = assembly.at_junction(assembly.nodes), int(np.argmax(assembly.at_junction(away)))
     at = f"entry {worst}" if nodes is None else position(nodes[worst], nodes)
     table = Table("figure", "value", title=f"{problem.scene.name}: the answer judged")
     table.add_row("largest displacement error, mm", f"{error:.3e} at {at}")

@@ -59,6 +59,7 @@ def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Pa
     else:
         assert np.array_equal(dense(files["G"]), dense(problem.G))
         assert np.array_equal(files["h"], problem.h(load))
+    assert np.array_equal(files["unit_mm"], np.ones(problem.assembly.n))
     assert float(files["limit_mm"][0]) == 1e-7
     assert 0 < float(files["bound_mm"][0]) < 1e-9
 
@@ -67,14 +68,16 @@ def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Pa
 def test_another_program_takes_the_place_of_the_first(listed: bool, scenes: Path, tmp_path: Path) -> None:
     """Readers tell forms apart by their files; a file of the user stays.
 
-    listed : whether about.json names the files of the first, which version 0.3.0 did not.
+    listed : whether about.json names the files of the first, which version 0.3.0 did not. It had no unit_mm.
     """
     out, words = tmp_path / "p", ("export", scenes / "tiny.npz", "--form")
     assert harness(*words, "primal", "--with-reference", "--out", out).exit_code == 0
     (out / "mine.txt").write_text("mine")
     about = json.loads((out / "about.json").read_text())
-    names = about["files"] if listed else about.pop("files")
-    assert sorted(path.name for path in out.iterdir()) == sorted(["mine.txt", *names])
+    assert sorted(path.name for path in out.iterdir()) == sorted(["mine.txt", *about["files"]])
+    if not listed:
+        (out / "unit_mm.mtx").unlink()
+        del about["files"]
     (out / "about.json").write_text(json.dumps(about))
     assert harness(*words, "dual", "--out", out).exit_code == 0
     assert {path.name for path in out.iterdir()} == {"P.mtx", "q.mtx", "lb.mtx", "about.json", "mine.txt"}
@@ -179,6 +182,23 @@ def test_displacements(name: str, shift: float, code: int, scenes: Path, answer:
     assert done.exit_code == code, done.output
     assert ("Outside" if code else "Within") in done.stdout
     assert f"{shift:.3e} at entry 7" in done.stdout
+
+
+def test_an_answer_in_other_units_is_judged_by_its_millimetres(tmp_path: Path) -> None:
+    """Each in its own unit: 2e-3 mm in the largest, and 1e-3 mm, a larger number, in the smallest."""
+    rung, out = "hard/units/unknowns", tmp_path / "p"
+    asked = ("export", rung, "--form", "primal", "--with-reference", "--out", out)
+    assert harness(*asked).exit_code == 0
+    files = read_problem(out)
+    x, unit = files["x"], files["unit_mm"]
+    large, small = int(unit.argmax()), int(unit.argmin())
+    assert unit[large] == 16
+    assert unit[small] == 1 / 16
+    x[large] += 2e-3 / unit[large]
+    x[small] += 1e-3 / unit[small]
+    done = harness("judge", written(tmp_path / "x.npz", x), rung)
+    assert done.exit_code == 1, done.output
+    assert f"2.000e-03 at entry {large}" in done.stdout
 
 
 def test_forces_alone_are_judged_by_their_displacements(scenes: Path, answer: Any, tmp_path: Path) -> None:
