@@ -55,7 +55,7 @@ def judge_file(
             raise Incomparable.one(path, f"length of {name}", len(answer[name]), allowed)
     refuse_other_places(path, answer, assembly)
     lam = answer.get("lam", np.full(assembly.m, np.nan))
-    x = answer["x"] if "x" in answer else problem.prepared.recover(lam, problem.load)
+    x = answer["x"] if "x" in answer else _recovered(path, problem, lam)
     limit = problem.limit_mm(limit_mm)
     judgement, bound = problem.judged(x, lam, limit), problem.reference.bound_mm
     console.print(_table(problem, judgement, x))
@@ -65,6 +65,16 @@ def judge_file(
         text = f"Cannot be judged: the reference is proven only to {bound:.1e} mm ({how})."
     console.print(text, style=STYLES[judgement.verdict])
     return CODES[judgement.verdict]
+
+
+def _recovered(path: Path, problem: ReferenceProblem, lam: Vector) -> Vector:
+    """x = K⁻¹(f − Aλ), (n,) mm. Raises InputError if it overflows, as of a λ that means no value."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        x = problem.prepared.recover(lam, problem.load)
+    if not np.isfinite(x).all():
+        k = int(np.argmax(abs(lam)))
+        raise InputError.one(path, f"lam[{k}]", float(lam[k]), "forces whose displacements do not overflow")
+    return x
 
 
 def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:

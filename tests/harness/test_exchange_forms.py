@@ -274,6 +274,15 @@ def test_what_is_no_answer_of_this_problem_is_refused(name: str, scenes: Path, t
     assert message in done.stderr
 
 
+def test_forces_whose_displacements_overflow_are_refused(tmp_path: Path) -> None:
+    """As where the largest number stands for no value."""
+    scene = tmp_path / "soft.npz"
+    np.savez(scene, K=0.5 * np.eye(2), A=[[1.0], [-1.0]], f=[3.0, -1.0], g=[0.5])
+    done = harness("judge", written(tmp_path / "lam.npz", np.array([1.7e308]), "lam"), scene)
+    assert done.exit_code == 2, done.output
+    assert "lam.npz: lam[0] = 1.7e+308: forces whose displacements do not overflow" in done.stderr
+
+
 def read_mps(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, float]]:
     """P, q, G, h and the lower bounds of a free MPS file with QUADOBJ; z is free but for these."""
     section, rows, columns = "", list[str](), dict[str, int]()
