@@ -217,20 +217,32 @@ WRITERS = {".npz": _write_npz, ".mps": _write_mps, ".qps": _write_mps}
 
 
 def _write_test_set(suite: str, out: Path, form: Form, console: Console) -> Path:
-    """Write the programs of the suite's scenes, and beside them their SHA-256, as `sha256sum` does."""
+    """Write the programs of the suite's scenes, one at a time, and beside them their SHA-256, as `sha256sum`
+    does.
+    """
     if not find_spec("pyarrow"):
         raise InputError.one("--out", "path", str(out), "needs pip install 'rivetbench[parquet]'")
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     refuse_unwritable(out)
-    rows: list[Arrays] = []
-    for scene in map(read_scene, read_suite(suite).scenes):
-        if not scene.refused:
-            arrays, _ = _program(scene, form, False, None)
-            dense = (M.toarray() if sp.issparse(M) else M for M in arrays.values())
-            line = dict(zip(arrays, map(np.ravel, dense), strict=True))
-            rows.append(dict.fromkeys(TEST_SET) | line | {"name": scene.name})
-    with atomic_output(out) as new:
-        pd.DataFrame(rows).to_parquet(new, engine="pyarrow", index=False)
+    scenes = [scene for scene in map(read_scene, read_suite(suite).scenes) if not scene.refused]
+    numbers = pa.list_(pa.float64())
+    schema = pa.schema([(name, pa.string() if name == "name" else numbers) for name in TEST_SET])
+
+    def line_of(scene: Scene) -> Any:
+        """The program of a scene as a table of one line."""
+        arrays, _ = _program(scene, form, False, None)
+        columns = dict.fromkeys(TEST_SET, pa.nulls(1, numbers)) | {"name": pa.array([scene.name])}
+        for name, M in arrays.items():
+            values = np.ravel(M.toarray() if sp.issparse(M) else M).astype(float, copy=False)
+            columns[name] = pa.ListArray.from_arrays([0, len(values)], pa.array(values))
+        return pa.table(columns, schema=schema)
+
+    with atomic_output(out) as new, pq.ParquetWriter(new, schema) as writer:
+        for scene in scenes:
+            writer.write_table(line_of(scene))
     digits = fingerprints([out])[out.name]
     replace_text(out.with_name(f"{out.name}.sha256"), f"{digits}  {out.name}\n")
-    console.print(f"{out}: {counted(len(rows), 'problem')}, {form} form, SHA-256 {digits}.")
+    console.print(f"{out}: {counted(len(scenes), 'problem')}, {form} form, SHA-256 {digits}.")
     return out

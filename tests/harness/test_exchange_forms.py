@@ -341,14 +341,17 @@ def test_an_mps_file_has_the_program_and_its_optimum(
 
 
 def test_a_suite_is_a_test_set(scenes: Path, tmp_path: Path) -> None:
-    """As qpbenchmark reads it: P, G and A by rows with as many columns as q has entries."""
-    pytest.importorskip("pyarrow")
+    """As qpbenchmark reads it: P, G and A by rows with as many columns as q has entries. One program is in
+    memory at a time: each is a group of rows.
+    """
+    parquet = pytest.importorskip("pyarrow.parquet")
     suite = 'scenes = ["tiny.npz", "strip.toml"]\n[[solver]]\nname = "gi"\n'
     (scenes / "pair.toml").write_text(suite)
     out = tmp_path / "pair.parquet"
     assert harness("export", scenes / "pair.toml", "--form", "primal", "--out", out).exit_code == 0
     said = subprocess.run(["sha256sum", "-c", f"{out.name}.sha256"], cwd=tmp_path, capture_output=True)
     assert said.returncode == 0
+    assert parquet.ParquetFile(out).num_row_groups == 2
     problems = pd.read_parquet(out, engine="pyarrow")
     assert list(problems["name"]) == ["tiny", "strip"]
     assert set(problems.columns) == {"P", "q", "G", "h", "A", "b", "lb", "ub", "name"}
