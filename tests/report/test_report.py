@@ -17,7 +17,7 @@ from report.document.numbers import significant
 from report.results.reader import Results, read
 from report.sections import profile
 from report.sections.speed import contacts
-from report.sections.summary import EACH, PREPARED, advice, explained, summary
+from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard, summary
 from report.writers.suite_report import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -73,6 +73,14 @@ def test_a_failure_counts_with_the_largest_limit_on_its_scene(tmp_path: Path) ->
     rows[-1] = row(LOW, "c", **times(solve_s=30.0) | {"time_limit_s": 40.0})
     lines = standings(results(tmp_path, rows).cells).set_index("method")["shifted_mean_s"]
     assert lines.to_dict() == pytest.approx({"a (dual)": 100.0, "b (dual)": 100.0, "c (dual)": 30.0})
+
+
+@pytest.mark.parametrize(("limit_s", "text"), [(0.4, "> 0.4 s"), (3600.0, "> 3600 s")])
+def test_a_time_limit_is_shown_with_its_digits(limit_s: float, text: str, tmp_path: Path) -> None:
+    late = no_answer("time_limit") | {"time_limit_s": limit_s}
+    cells = results(tmp_path, [row(LOW, "a"), row(LOW, "b", **late)]).cells
+    drawing = scoreboard(cells, standings(cells))
+    assert text in [one.get_text() for axes in drawing.axes for one in axes.texts]
 
 
 def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_path: Path) -> None:
