@@ -162,13 +162,14 @@ def run_series(
     form_and_threads = {"form": choice.form, "threads": threads}
     job = Job(**vars(options) | form_and_threads, scene=read, cases=chosen)
     facts = {"solver_version": made.version, "solver_code": made.code}
+    files = fingerprints(inputs) if report else {}  # now: they may change meanwhile
     code = run(job, facts, directory, console_of(reporter), scheduler)
     verdict: dict[str, Any] = {"kind": "", "said": []}
     if allow_gap_mm is not None and sum(1 for _ in series_file.rows(directory)) == chosen.count:
         verdict = check_series(directory, allow_gap_mm)
     path = None
     if report and series_file.read_facts(directory):
-        more: dict[str, Any] = {"inputs": fingerprints(inputs)}
+        more: dict[str, Any] = {"inputs": files}
         whole = cases.contributors and code == DONE and not read.stages
         more |= {"derivatives": derivatives(job)} if whole else {}
         series_file.add_facts(directory, more)
