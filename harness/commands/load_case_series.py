@@ -12,7 +12,7 @@ from harness.planning.form_choice import chosen_form
 from harness.results import records, series_file
 from harness.results.atomic_output import refuse_inputs, refuse_unwritable
 from harness.results.provenance import fingerprints
-from harness.results.records import Row, to_line
+from harness.results.records import Row
 from harness.results.schema import SERIES
 from harness.scene.allowed_gap import check_series, refuse_unusable
 from harness.scene.solution import Source, load_scene
@@ -162,16 +162,17 @@ def run_series(
     form_and_threads = {"form": choice.form, "threads": threads}
     job = Job(**vars(options) | form_and_threads, scene=read, cases=chosen)
     facts = {"solver_version": made.version, "solver_code": made.code}
+    files = fingerprints(inputs) if report else {}  # now: they may change meanwhile
     code = run(job, facts, directory, console_of(reporter), scheduler)
     verdict: dict[str, Any] = {"kind": "", "said": []}
     if allow_gap_mm is not None and sum(1 for _ in series_file.rows(directory)) == chosen.count:
         verdict = check_series(directory, allow_gap_mm)
     path = None
-    if report and (written := series_file.read_facts(directory)):
-        more: dict[str, Any] = {"inputs": fingerprints(inputs)}
+    if report and series_file.read_facts(directory):
+        more: dict[str, Any] = {"inputs": files}
         whole = cases.contributors and code == DONE and not read.stages
         more |= {"derivatives": derivatives(job)} if whole else {}
-        series_file.write_fact(directory, "series", to_line(written | more))
+        series_file.add_facts(directory, more)
         from report.writers.series_report import write  # slow to import: not before the first row
 
         path = write(directory)

@@ -32,7 +32,7 @@ from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
-from problems.scene_files import scene_of
+from problems.scene_files import read_scene, scene_of
 from report.document.numbers import counted, position, upwards
 from report.document.verdict_colours import FAIL, PASS
 
@@ -201,6 +201,9 @@ class Page:
                 raise InputError.one("page", "scene file", str(path), "a name that ends in .toml")
             if path.exists():
                 raise InputError.one("page", "scene file", str(path), "exists: name another")
+            if read_scene(self.source).key != self.explorer.scene.key:
+                allowed = "has changed since it was read: start explore again"
+                raise InputError.one("page", "scene", self.source, allowed)
             text = edited(self.source, path.parent, self.settings.write_to, CHANGED)
             scene_of(tomllib.loads(text), str(path))  # refused now, in the words of `solve`
             replace_text(path, text)

@@ -25,7 +25,7 @@ from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints
 from harness.scene.allowed_gap import refuse_unusable
-from harness.scene.scene_file import MOVED, edited, file_of, with_fasteners
+from harness.scene.scene_file import MOVED, edited, file_of, opened, with_fasteners
 from harness.scene.solution import Source, load_scene
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run as run_series
@@ -162,9 +162,11 @@ def place(
     case_numbers = Cases.of(study.cases.count, isinstance(study.cases, MeasuredGaps), goal)
     law = other_gaps(study.bare, study.cases)
     preload: Any = movable.fastener.preload
+    text = opened(source)  # these files may change while plans are searched
+    files = fingerprints(file for file in inputs if file.is_file())
 
     def text_of(plan: Plan) -> str:
-        return edited(source, directory, with_fasteners(plan, preload), MOVED, law)
+        return edited(text, directory, with_fasteners(plan, preload), MOVED, law)
 
     current = text_of(movable.current)  # refused now rather than after the search
     facts = {"solver_version": newton.version, "solver_code": newton.code}
@@ -198,7 +200,6 @@ def place(
         words, passed = sentence_on(result, goal, nodes)
         record = record_of(study, movable.current, holes, goal, result, nodes)
         labels = [names.get(place, "") for place in holes]
-        files = fingerprints(file for file in inputs if file.is_file())
         told = {"said": words, "names": labels, "inputs": files}
         records.replace_object(directory / RECORD, record | told)
         steps = zip(result.order[1:], result.order, strict=False)

@@ -7,21 +7,24 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from harness.results.records import replace_text, to_line
+from harness.results.records import parsed, replace_text, to_line
 from problems.errors import InputError
 from problems.input.bounded_types import resolved
 
-RECORD = "solution.json"  # of an answer
+RECORD, PROGRAM = "solution.json", "about.json"  # of an answer, of an exported quadratic program
+#: The files of a program that an older version exported, without a list of them.
+ARRAYS = ("P", "q", "G", "h", "lb", "x", "lam", "bound_mm", "limit_mm")
+EXPORTED = [PROGRAM, *(f"{name}.mtx" for name in ARRAYS)]
 
 
 @contextmanager
 def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     """A path beside `out` to write a file or a folder to; at the end of the block it moves to `out`.
 
-    Files of the same names are replaced, and those that an older answer left removed: a record solution.json
-    gets the names of all files beside it. Whatever the block raises, nothing has changed. Raises InputError
-    if `out` is no regular file or folder, is of the other kind, is one of the inputs, or cannot be written.
-    The block only writes.
+    Files of the same names are replaced, and those that an older answer or program left removed: a record
+    solution.json gets the names of all files beside it, about.json has them. Whatever the block raises,
+    nothing has changed. Raises InputError if `out` is no regular file or folder, is of the other kind, is one
+    of the inputs, or cannot be written. The block only writes.
     """
     refuse_unwritable(out, inputs)
     try:
@@ -57,12 +60,19 @@ def _record_files(record: Path) -> None:
 
 
 def _listed(folder: Path) -> set[Path]:
-    """The files that its record names; none, if there is none to be read."""
+    """The files that its records name; none, if there is none to be read."""
+    names = [*_names(folder / RECORD, []), *_names(folder / PROGRAM, EXPORTED)]
+    return {folder / name for name in names if Path(name).name == name}
+
+
+def _names(record: Path, older: list[str]) -> list[str]:
+    """The names of files in a record. older : those of a record that lists none."""
     try:
-        names = json.loads((folder / RECORD).read_text("utf-8"))["files"]
-        return {folder / name for name in names if Path(name).name == name}
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
+        content = parsed(record.read_bytes())
+        ours = record.name == RECORD or {"scene_key", "form"} <= content.keys()
+        return [*map(os.fspath, content.get("files", older))] if ours else []
+    except (OSError, ValueError, TypeError):
+        return []
 
 
 def refuse_unwritable(out: Path, inputs: Sequence[Path] = (), option: str = "--out") -> None:

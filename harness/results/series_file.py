@@ -36,6 +36,7 @@ TABLES = (
     "CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL)",
     "CREATE TABLE IF NOT EXISTS cases (number INTEGER PRIMARY KEY, row TEXT NOT NULL, gap BLOB)",
 )
+FACTS = "SELECT value FROM facts WHERE name = 'series'"
 ROWS = "SELECT number, row FROM cases WHERE number < ? ORDER BY number"
 WITHOUT_GAP = """
 SELECT number FROM cases
@@ -125,6 +126,15 @@ def write_fact(directory: Path, name: str, value: str | bytes) -> None:
         connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", (name, value))
 
 
+def add_facts(directory: Path, more: Mapping[str, Any]) -> None:
+    """Put more into the value of `series`, if there is one, as it is by now."""
+    with connected(directory, "EXCLUSIVE") as connection:
+        fact = connection.execute(FACTS).fetchone()
+        if fact is not None:
+            value = to_line(records.parsed(fact[0]) | dict(more))
+            connection.execute("UPDATE facts SET value = ? WHERE name = 'series'", (value,))
+
+
 def append(directory: Path, cases: Iterable[tuple[Row, Gaps | None]]) -> None:
     """Write rows with their gaps, all of them or none."""
     with connected(directory, "EXCLUSIVE") as connection:
@@ -141,7 +151,7 @@ def read_facts(directory: Path) -> dict[str, Any] | None:
     if not _begun(path):
         return None
     with connected(directory) as connection:
-        fact = connection.execute("SELECT value FROM facts WHERE name = 'series'").fetchone()
+        fact = connection.execute(FACTS).fetchone()
     if fact is None:
         return None
     try:

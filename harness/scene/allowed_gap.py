@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from harness.results import series_file
-from harness.results.records import to_line
 from harness.results.series_file import CHECK
 from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
@@ -157,8 +156,7 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
         largest = f"the largest is {series.cases['max_gap_mm'].max():.3g} mm"
         said.append(f"PASS: in none of {cases} is a gap larger than {allowed_mm:g} mm; {largest}.")
     check = {"kind": kind, "said": said, "allowed_mm": allowed_mm}
-    facts = series_file.read_facts(directory) or {}
-    series_file.write_fact(directory, "series", to_line(facts | {CHECK: check}))
+    series_file.add_facts(directory, {CHECK: check})
     return check
 
 

@@ -3,11 +3,12 @@
     min ½zᵀPz + qᵀz   subject to   Gz ≤ h     primal: z = x, n displacements, mm; sparse: z = û, N unknowns
                                    z ≥ lb     dual: z = λ, m contact forces, N
 
-The arrays are P, q, and G, h or lb; with the reference also x (mm), lam (the multipliers of Gz ≤ h, N),
-bound_mm, the proven bound on max|x − x*|, and limit_mm, the largest error that an answer may have. They are
-written as a folder of Matrix Market files, one per array and with 17 digits, or as one .npz; about.json, or
-the texts in the .npz, name the problem. MPS has P, q, G, h, lb. The programs of a suite are a test set of
-qpbenchmark, a Parquet file.
+The arrays are P, q, and G, h or lb; with the reference also x, lam (the multipliers of Gz ≤ h), unit_mm, the
+length of one unit of each x, bound_mm, the proven bound on max|x − x*|·unit_mm, and limit_mm, the largest
+error that an answer may have. Units are mm and N but on rungs in others. They are written as a folder of
+Matrix Market files, one per array and with 17 digits, or as one .npz; about.json, or the texts in the .npz,
+name the problem. MPS has P, q, G, h, lb. The programs of a suite are a test set of qpbenchmark, a Parquet
+file.
 """
 
 import json
@@ -22,7 +23,7 @@ from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
 from harness.planning.suite import read_suite
-from harness.results.atomic_output import atomic_output, refuse_unwritable
+from harness.results.atomic_output import PROGRAM, atomic_output, refuse_unwritable
 from harness.results.provenance import fingerprints
 from harness.results.records import replace_text
 from harness.terminal.console import console_of
@@ -162,7 +163,8 @@ def _program(scene: Scene, form: Form, with_reference: bool, limit_s: float | No
         arrays |= {"G": problem.G, "h": problem.h(load)}
     if with_reference:
         reference, limit_mm = judged.reference, judged.limit_mm(LIMIT_MM)
-        arrays |= {"x": reference.x, "lam": reference.lam}
+        unit_mm = np.full(reference.x.shape, reference.unit_mm)
+        arrays |= {"x": reference.x, "lam": reference.lam, "unit_mm": unit_mm}
         arrays |= {"bound_mm": np.array([reference.bound_mm]), "limit_mm": np.array([limit_mm])}
     about = {"scene": scene.name, "title": scene.title, "scene_key": scene.key, "form": form}
     return arrays, about | {"n": problem.assembly.n, "m": problem.assembly.m}
@@ -180,7 +182,8 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
     for name, M in arrays.items():
         matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
         formats.matrix_text.write_one(path / f"{name}.mtx", matrix, "general")
-    (path / "about.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")
+    about = about | {"files": sorted([PROGRAM, *(f"{name}.mtx" for name in arrays)])}
+    (path / PROGRAM).write_text(json.dumps(about, indent=1) + "\n", "utf-8")
 
 
 def _write_mps(path: Path, arrays: Arrays, about: Arrays) -> None:
@@ -214,20 +217,32 @@ WRITERS = {".npz": _write_npz, ".mps": _write_mps, ".qps": _write_mps}
 
 
 def _write_test_set(suite: str, out: Path, form: Form, console: Console) -> Path:
-    """Write the programs of the suite's scenes, and beside them their SHA-256, as `sha256sum` does."""
+    """Write the programs of the suite's scenes, one at a time, and beside them their SHA-256, as `sha256sum`
+    does.
+    """
     if not find_spec("pyarrow"):
         raise InputError.one("--out", "path", str(out), "needs pip install 'rivetbench[parquet]'")
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     refuse_unwritable(out)
-    rows: list[Arrays] = []
-    for scene in map(read_scene, read_suite(suite).scenes):
-        if not scene.refused:
-            arrays, _ = _program(scene, form, False, None)
-            dense = (M.toarray() if sp.issparse(M) else M for M in arrays.values())
-            line = dict(zip(arrays, map(np.ravel, dense), strict=True))
-            rows.append(dict.fromkeys(TEST_SET) | line | {"name": scene.name})
-    with atomic_output(out) as new:
-        pd.DataFrame(rows).to_parquet(new, engine="pyarrow", index=False)
+    scenes = [scene for scene in map(read_scene, read_suite(suite).scenes) if not scene.refused]
+    numbers = pa.list_(pa.float64())
+    schema = pa.schema([(name, pa.string() if name == "name" else numbers) for name in TEST_SET])
+
+    def line_of(scene: Scene) -> Any:
+        """The program of a scene as a table of one line."""
+        arrays, _ = _program(scene, form, False, None)
+        columns = dict.fromkeys(TEST_SET, pa.nulls(1, numbers)) | {"name": pa.array([scene.name])}
+        for name, M in arrays.items():
+            values = np.ravel(M.toarray() if sp.issparse(M) else M).astype(float, copy=False)
+            columns[name] = pa.ListArray.from_arrays([0, len(values)], pa.array(values))
+        return pa.table(columns, schema=schema)
+
+    with atomic_output(out) as new, pq.ParquetWriter(new, schema) as writer:
+        for scene in scenes:
+            writer.write_table(line_of(scene))
     digits = fingerprints([out])[out.name]
     replace_text(out.with_name(f"{out.name}.sha256"), f"{digits}  {out.name}\n")
-    console.print(f"{out}: {counted(len(rows), 'problem')}, {form} form, SHA-256 {digits}.")
+    console.print(f"{out}: {counted(len(scenes), 'problem')}, {form} form, SHA-256 {digits}.")
     return out

@@ -61,7 +61,7 @@ def judge_file(
             raise Incomparable.one(path, f"length of {name}", len(answer[name]), allowed)
     refuse_other_places(path, answer, assembly)
     lam = answer.get("lam", np.full(assembly.m, np.nan))
-    x = answer["x"] if "x" in answer else problem.prepared.recover(lam, problem.load)
+    x = answer["x"] if "x" in answer else _recovered(path, problem, lam)
     limit = problem.limit_mm(limit_mm)
     judgement, bound = problem.judged(x, lam, limit), problem.reference.bound_mm
     console.print(_table(problem, judgement, x))
@@ -73,12 +73,22 @@ def judge_file(
     return CODES[judgement.verdict]
 
 
+def _recovered(path: Path, problem: ReferenceProblem, lam: Vector) -> Vector:
+    """x = K⁻¹(f − Aλ), (n,) mm. Raises InputError if it overflows, as of a λ that means no value."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        x = problem.prepared.recover(lam, problem.load)
+    if not np.isfinite(x).all():
+        k = int(np.argmax(abs(lam)))
+        raise InputError.one(path, f"lam[{k}]", float(lam[k]), "forces whose displacements do not overflow")
+    return x
+
+
 def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
     """The judge's figures, and where the largest error is."""
     error, bound = judgement.displacement_error_mm or 0.0, problem.reference.bound_mm
     assembly = problem.prepared.assembly
-    nodes, away = assembly.at_junction(assembly.nodes), assembly.at_junction(abs(x - problem.reference.x))
-    worst = int(np.argmax(away))
+    away = abs(x - problem.reference.x) * problem.reference.unit_mm
+    nodes, worst = assembly.at_junction(assembly.nodes), int(np.argmax(assembly.at_junction(away)))
     at = f"entry {worst}" if nodes is None else position(nodes[worst], nodes)
     table = Table("figure", "value", title=f"{problem.scene.name}: the answer judged")
     table.add_row("largest displacement error, mm", f"{error:.3e} at {at}")

@@ -20,25 +20,34 @@ MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes", "stress", "stress_points")  # may be relative paths
 
 
+def opened(source: str) -> tuple[str, Path]:
+    """The text of a scene's file, and the folder that its paths are relative to.
+
+    Raises InputError if the scene has no file, as a rung of a ladder.
+    """
+    if table := drawn_table(source):
+        return tomlkit.dumps(table), SCENES
+    path = Path(source) if source.endswith(".toml") else SCENES / f"{source}.toml"
+    if not path.is_file():
+        raise InputError.one("scene", "name", source, "a scene in a file, so that its values can change")
+    return read_text(path, "file", TOML_MIB, strict=True), path.parent
+
+
 def edited(
-    source: str,
+    source: str | tuple[str, Path],
     folder: Path,
     change: Callable[[Any], None],
     kinds: Sequence[str],
     law: RandomGaps | None = None,
 ) -> str:
-    """The changed text of a scene's file, with paths relative to `folder`. kinds : the kinds of effects that
-    change. law : random gaps in place of the scene's.
+    """The changed text of a scene's file, with paths relative to `folder`. source : the file, or what
+    `opened` has read of it. kinds : the kinds of effects that change. law : random gaps in place of the
+    scene's.
 
-    Raises InputError if the scene has no file, as a rung of a ladder, or if its assembly has such effects.
+    Raises InputError if the scene has no file, or if its assembly has such effects.
     """
-    if table := drawn_table(source):
-        document, home = tomlkit.parse(tomlkit.dumps(table)), SCENES
-    else:
-        path = Path(source) if source.endswith(".toml") else SCENES / f"{source}.toml"
-        if not path.is_file():
-            raise InputError.one("scene", "name", source, "a scene in a file, so that its values can change")
-        document, home = tomlkit.parse(read_text(path, "file", TOML_MIB, strict=True)), path.parent
+    text, home = opened(source) if isinstance(source, str) else source
+    document = tomlkit.parse(text)
     if "assembly" in document:
         there = read_toml(assembly := assembly_path(home / "scene", document["assembly"])).get("effect", [])
         changed = (*kinds, "initial_gap") if law else kinds

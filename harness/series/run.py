@@ -192,6 +192,6 @@ def summary(rows: Iterable[Row], cases: int, console: Console) -> int:
     if missing := cases - sum(counts.values()):
         console.print(f"Not solved: {missing}. Run the same command again.", style="red")
         return FAILED
-    if counts["outside"] + counts["no_answer"] and counts["within"] + counts["outside"]:
+    if counts["outside"] + counts["no_answer"]:
         return FAILED
     return DONE if counts["within"] == cases else NOTHING_JUDGED

@@ -17,7 +17,7 @@ from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints, stamp
-from harness.scene.scene_file import add_effect, edited, file_of
+from harness.scene.scene_file import add_effect, edited, file_of, opened
 from harness.scene.solution import Source, load_scene
 from harness.scene.stress import refuse_unusable
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
@@ -190,13 +190,15 @@ def shim(
         there = patches_of_gap(bare.joint, gap, allow_gap_mm) or there
         study = replace(study, patches=there)
     law = other_gaps(bare, made)
+    scene_text = ("", directory) if each else opened(file_of(scene, read))
+    files = fingerprints(file for file in inputs if file.is_file())  # which may change during the search
 
     def text(shims: list[Shims]) -> str:
         def change(document: Any) -> None:
             for one in shims:
                 add_effect(document, one.model_dump(mode="json", exclude_none=True))
 
-        return edited(file_of(scene, read), directory, change, (), law)
+        return edited(scene_text, directory, change, (), law)
 
     with_one = "" if each else text([there[0].shim])  # refused now rather than after the search
     asked |= {"share": goal.share, "stock": list(thicknesses), "each": each, "taper": taper}
@@ -221,7 +223,6 @@ def shim(
                 words, passed = sentence_of(result, goal, study)
         from report.writers.shim_report import write  # slow to import: not before the search
 
-        files = fingerprints(file for file in inputs if file.is_file())
         record |= {"scene": bare.name, "title": bare.title, "scene_key": read.key, "inputs": files}
         record |= asked | {"said": words, **stamp()}
         if not each:

@@ -145,7 +145,7 @@ def grid(
         right += width + GAP
     shown = [{scene for group, _ in strip for scene in group.columns} for strip in strips]
     lines = [[row for row in rows if any((row, scene) in cells for scene in of)] for of in shown]
-    longest = max((len(name) for group in groups for name in group.columns.values()), default=1)
+    longest = max((len(name) for group in groups for name in group.columns.values()), default=0) or 1
     upright = room < LETTER * SMALLEST * longest
     tick = min(size, room if upright else room / (LETTER * longest))
     above = size * (1.4 + any(group.about for group in groups))

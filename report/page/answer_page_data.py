@@ -112,12 +112,12 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
     return {"kind": kind, "text": f"{verdict}; {largest}{near}."}
 
 
-def two_answers_data(answers: list[SavedAnswer]) -> Data:
-    """The data of the page of two answers on one junction."""
+def two_answers_data(answers: list[SavedAnswer], common: list[SavedAnswer]) -> Data:
+    """The data of the page of two answers on one junction. common : with their gaps at common places."""
     records = [record for record, _ in answers]
     named = [f"{record['scene']}: {record['title']}, {record['method']}" for record in records]
     said = [headline(*answer)["text"] for answer in answers]
-    maps = two_answers_maps(records[0], [arrays for _, arrays in answers])
+    maps = two_answers_maps(common[0][0], [arrays for _, arrays in common])
     both = [["first", named[0], said[0]], ["second", named[1], said[1]]]
     return _with_maps(records, both, maps)
 

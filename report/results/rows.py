@@ -121,7 +121,7 @@ def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
     """The values of a column (label, method, solver) in the order of all tables: owner, solver, form."""
     lines = cells.drop_duplicates(name)
     places = [
-        (OWNERS.index(owner), solver, form_place(form), str(label))
+        (_place(owner, OWNERS), solver, form_place(form), str(label))
         for owner, solver, form, label in zip(
             lines["owner"], lines["solver"], lines["form"], lines[name], strict=True
         )
@@ -131,4 +131,14 @@ def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
 
 def form_place(form: str) -> int:
     """The place of a form in the order of FORMS; a form not named there comes last."""
-    return FORMS.index(form) if form in FORMS else len(FORMS)
+    return _place(form, FORMS)
+
+
+def _place(name: str, names: Sequence[str]) -> int:
+    return names.index(name) if name in names else len(names)
+
+
+def rung_of(scene: str) -> tuple[str, str]:
+    """The ladder and the rung of hard/<ladder>/<rung>, or of another prefix; "" for what a name lacks."""
+    _, ladder, rung = [*scene.split("/", 2), "", ""][:3]
+    return ladder, rung

@@ -18,7 +18,7 @@ from report.document.numbers import as_number, out_of, power, raised, whole
 from report.figures.line_charts import Cell, Group, grid
 from report.figures.style import BLUE, VERMILLION
 from report.results.reader import Results
-from report.results.rows import in_order
+from report.results.rows import in_order, rung_of
 
 CORRECT, CORRECT_UNCLAIMED = "correct, reported solved", "correct, not reported solved"
 WRONG_UNCLAIMED, WRONG_CLAIMED = "wrong, not reported solved", "wrong, reported solved"
@@ -90,7 +90,7 @@ def rungs_in_order(results: Results, cells: pd.DataFrame) -> dict[str, list[str]
     listed = [scene for scene in results.suite.get("scenes", []) if scene in set(cells["scene"])]
     ladders: dict[str, list[str]] = {}
     for scene in dict.fromkeys([*listed, *cells["scene"]]):
-        _, ladder, rung = scene.split("/")
+        ladder, rung = rung_of(scene)
         ladders.setdefault(ladder, []).append(rung)
     return ladders
 
@@ -98,11 +98,10 @@ def rungs_in_order(results: Results, cells: pd.DataFrame) -> dict[str, list[str]
 def with_outcomes(cells: pd.DataFrame) -> pd.DataFrame:
     """Cells on rungs with `ladder`, `rung` and `outcome`, without the forms that a solver does not take."""
     taken = cells[cells["status"] != "unsupported"]
-    names = taken["scene"].str.split("/", expand=True)
+    names = [*map(rung_of, taken["scene"])]
     ends = zip(taken["verdict"], taken["status"] == "solved", strict=True)
-    return taken.assign(
-        ladder=names[1], rung=names[2], outcome=[OUTCOMES.get(end, NO_ANSWER) for end in ends]
-    )
+    outcomes = [OUTCOMES.get(end, NO_ANSWER) for end in ends]
+    return taken.assign(ladder=[one for one, _ in names], rung=[one for _, one in names], outcome=outcomes)
 
 
 def ladder_map(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Drawing:

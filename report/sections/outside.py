@@ -7,6 +7,7 @@ from report.analysis.standings import seconds_text
 from report.document.blocks import Column, Section, Table, number, records, word
 from report.document.numbers import MISSING, power, significant, whole
 from report.results.reader import Results
+from report.results.rows import rung_of
 
 PREFIX = "outside/"
 DIGITS = 9  # of an objective as shown
@@ -19,15 +20,16 @@ def section(results: Results) -> Section | None:
     if answered.empty:
         return None
     best = answered.sort_values("displacement_error_mm").drop_duplicates("scene")
-    tables = [_printed(best, results.problems), _refined(best)]
-    return Section("Problems from outside", [table for table in tables if table])
+    tables = [table for table in (_printed(best, results.problems), _refined(best)) if table]
+    return Section("Problems from outside", [*tables]) if tables else None
 
 
 def _printed(best: pd.DataFrame, problems: pd.DataFrame) -> Table | None:
     if "printed_objective" not in problems:
         return None
-    known = problems.dropna(subset=["printed_objective"]).drop_duplicates("scene", keep="last")
-    both = best.merge(known[["scene", "printed_objective", "printed_digits", "printed_source"]], on="scene")
+    printed = ["printed_objective", "printed_digits", "printed_source"]
+    known = problems.reindex(columns=["scene", *printed]).dropna(subset=printed)
+    both = best.merge(known.drop_duplicates("scene", keep="last"), on="scene")
     if both.empty:
         return None
     away = (both["objective"] - both["printed_objective"]).abs() / both["printed_objective"].abs()
@@ -47,8 +49,9 @@ def _printed(best: pd.DataFrame, problems: pd.DataFrame) -> Table | None:
 
 
 def _refined(best: pd.DataFrame) -> Table | None:
-    parts = best["scene"].str.split("/", expand=True)
-    lines = best.assign(problem=parts[1], cells=pd.to_numeric(parts[2], errors="coerce"))
+    problems, sizes = zip(*map(rung_of, best["scene"]), strict=True)
+    cells = pd.to_numeric(pd.Series(sizes, best.index), errors="coerce")
+    lines = best.assign(problem=problems, cells=cells)
     lines = lines.dropna(subset="cells").sort_values(["problem", "cells"], ignore_index=True)
     if lines.empty:
         return None

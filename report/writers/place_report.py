@@ -32,7 +32,6 @@ FAMILIES = {
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report/report.md from the record and the series in DIRECTORY. Returns its path."""
     record = quoted(json.loads((directory / "place.json").read_text("utf-8")))
-    target = emptied(directory / "report")
     steps = pd.DataFrame(record["steps"])
     title = f"Where fasteners go: {record['title']}"
     with style.applied():
@@ -41,6 +40,7 @@ def write(directory: Path) -> Path:
         sections.append(Section("Where the gap is left", _maps(record, directory)))
         if record["order"]:
             sections.append(Section("In which order to set them", _order(record)))
+    target = emptied(directory / "report")
     page = written(target / "report.md", title, sections)
     write_sheet(target / "sheet.pdf", _sheet(record, title, directory))
     return page

@@ -45,11 +45,11 @@ def write(directory: Path) -> Path:
     Returns the path of report.md.
     """
     series = read(directory)
-    target = emptied(directory / "report")
     check = series.facts.get("allowed_gap")
     verdict = [Text(f"**{check['said'][-1]}** {' '.join(check['said'][:-1])} {WHERE}")] if check else []
     sections = [Section("Summary", [*verdict, _summary(series)])]
     title = f"Series on {series.facts['scene']}: {counted(series.facts['cases'], 'load case')}"
+    data: Data = {}
     if len(series.cases):
         maps, curve = quantile_maps(series), exceedance(series)
         with style.applied():
@@ -57,9 +57,10 @@ def write(directory: Path) -> Path:
             figures = [*_maps(series, maps), _exceedance(curve, len(series.cases)), *spread]
             blocks = [*figures, *contributors_of(series), _statistics(series)]
         sections.append(Section("The remaining gap", blocks))
-        write_page(
-            target / "index.html", title, series_data(series, maps, [*PERCENT.values(), "mean"], curve)
-        )
+        data = series_data(series, maps, [*PERCENT.values(), "mean"], curve)
+    target = emptied(directory / "report")
+    if data:
+        write_page(target / "index.html", title, data)
     page = written(target / "report.md", title, sections)
     if len(series.cases):
         write_sheet(target / "sheet.pdf", _sheet(series, directory, target))

@@ -28,7 +28,7 @@ def write(directory: Path) -> Path:
     Raises FileNotFoundError if DIRECTORY has no measurements.jsonl.
     """
     results = read(directory)
-    target, machines = emptied(directory / "report"), results.by_machine()
+    machines = results.by_machine()
     with style.applied():
         sections = [
             section for k, part in enumerate(machines) for section in _made(part, k if machines[1:] else None)
@@ -38,7 +38,9 @@ def write(directory: Path) -> Path:
     intro += [f"> **Warning.** {warning}" for warning in warnings(results)]
     if len(sections) >= LONG:
         intro.append(f"Contents: {contents([section.title for section in sections])}")
-    write_page(target / "index.html", results.title, run_data(results), directory)
+    data = run_data(results)
+    target = emptied(directory / "report")  # now that nothing of the older one is lost
+    write_page(target / "index.html", results.title, data, directory)
     return written(target / "report.md", results.title, sections, intro)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from report.document.blocks import Figure, Section, Text
+from report.document.escape import quoted
 from report.figures import style
 from report.writers.sections_writer import written
 
@@ -15,6 +16,7 @@ LOOKS = {False: (style.BLUE, "the cases that chose"), True: (style.VERMILLION, "
 
 def write(directory: Path, key: str, share: float, said: Sequence[str], shares: Sequence[object]) -> Path:
     """Write report.md, shares.png and shares.csv. shares : of each value tried, with its interval."""
+    key, said = quoted(key), [*map(quoted, said)]  # with the name of a scene
     table = pd.DataFrame(shares).sort_values(["fresh", "value"])
     with style.applied():
         drawing = style.figure(3.2)

@@ -61,7 +61,7 @@ def write(
         columns += [*(number(side, f"{side}_N") for side in SIDES)]
         blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", forces, columns))
     title = f"{names[0]} and {names[1]}"
-    write_page(directory / "index.html", title, two_answers_data(common))
+    write_page(directory / "index.html", title, two_answers_data(answers, common))
     sections, files = [Section("Two scenes on one junction", blocks)], {"contacts": table}
     return written(directory / "comparison.md", title, sections, files=files), pairs, said
 

@@ -1,6 +1,8 @@
 """Contributors of a series: Sobol indices in closed form, by quadrature where contacts close, and files."""
 
+import json
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +145,28 @@ def test_what_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     (left_out,) = contributors_of(replace(done, cases=done.cases[1:]))
     assert isinstance(left_out, Text)
     assert "left out: 1 of 64 cases without an answer" in left_out.markdown
+
+
+def test_a_series_that_grows_meanwhile_keeps_its_new_facts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another command extends it while the derivatives are computed, and its scene is edited."""
+    scene, out = write_strip(tmp_path), tmp_path / "out"
+    read = sha256(scene.read_bytes()).hexdigest()
+
+    def meanwhile(_: object) -> dict[str, list[str]]:
+        facts = series_file.read_facts(out) or {}
+        series_file.write_fact(out, "series", json.dumps(facts | {"cases": 64}))
+        scene.write_text("# for the next series")
+        return {"input": []}
+
+    monkeypatch.setattr("harness.commands.load_case_series.derivatives", meanwhile)
+    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
+    words = ("--random", "pressure.value=normal(1e-4, 1e-5)", "--contributors", 2, "--out", out)
+    assert harness("series", scene, *words).exit_code == 0
+    facts = series_file.read_facts(out) or {}
+    assert (facts["cases"], facts["derivatives"]) == (64, {"input": []})
+    assert facts["inputs"] == {"strip.toml": read}
 
 
 def test_forces_in_fasteners(tmp_path: Path) -> None:

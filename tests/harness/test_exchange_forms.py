@@ -1,5 +1,6 @@
 """`export --form` and `judge`: problems to other programs, bit for bit, and their answers back."""
 
+import json
 import runpy
 import shutil
 import subprocess
@@ -58,8 +59,36 @@ def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Pa
     else:
         assert np.array_equal(dense(files["G"]), dense(problem.G))
         assert np.array_equal(files["h"], problem.h(load))
+    assert np.array_equal(files["unit_mm"], np.ones(problem.assembly.n))
     assert float(files["limit_mm"][0]) == 1e-7
     assert 0 < float(files["bound_mm"][0]) < 1e-9
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_another_program_takes_the_place_of_the_first(listed: bool, scenes: Path, tmp_path: Path) -> None:
+    """Readers tell forms apart by their files; a file of the user stays.
+
+    listed : whether about.json names the files of the first, which version 0.3.0 did not. It had no unit_mm.
+    """
+    out, words = tmp_path / "p", ("export", scenes / "tiny.npz", "--form")
+    assert harness(*words, "primal", "--with-reference", "--out", out).exit_code == 0
+    (out / "mine.txt").write_text("mine")
+    about = json.loads((out / "about.json").read_text())
+    assert sorted(path.name for path in out.iterdir()) == sorted(["mine.txt", *about["files"]])
+    if not listed:
+        (out / "unit_mm.mtx").unlink()
+        del about["files"]
+    (out / "about.json").write_text(json.dumps(about))
+    assert harness(*words, "dual", "--out", out).exit_code == 0
+    assert {path.name for path in out.iterdir()} == {"P.mtx", "q.mtx", "lb.mtx", "about.json", "mine.txt"}
+
+
+def test_a_record_of_another_program_names_nothing_to_remove(scenes: Path, tmp_path: Path) -> None:
+    (tmp_path / "about.json").write_text('{"files": ["mine.mtx"]}')
+    (tmp_path / "mine.mtx").write_text("mine")
+    asked = ("export", scenes / "tiny.npz", "--form", "dual", "--out", tmp_path)
+    assert harness(*asked).exit_code == 0
+    assert (tmp_path / "mine.mtx").read_text() == "mine"
 
 
 def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: Path) -> None:
@@ -155,6 +184,23 @@ def test_displacements(name: str, shift: float, code: int, scenes: Path, answer:
     assert f"{shift:.3e} at entry 7" in done.stdout
 
 
+def test_an_answer_in_other_units_is_judged_by_its_millimetres(tmp_path: Path) -> None:
+    """Each in its own unit: 2e-3 mm in the largest, and 1e-3 mm, a larger number, in the smallest."""
+    rung, out = "hard/units/unknowns", tmp_path / "p"
+    asked = ("export", rung, "--form", "primal", "--with-reference", "--out", out)
+    assert harness(*asked).exit_code == 0
+    files = read_problem(out)
+    x, unit = files["x"], files["unit_mm"]
+    large, small = int(unit.argmax()), int(unit.argmin())
+    assert unit[large] == 16
+    assert unit[small] == 1 / 16
+    x[large] += 2e-3 / unit[large]
+    x[small] += 1e-3 / unit[small]
+    done = harness("judge", written(tmp_path / "x.npz", x), rung)
+    assert done.exit_code == 1, done.output
+    assert f"2.000e-03 at entry {large}" in done.stdout
+
+
 def test_forces_alone_are_judged_by_their_displacements(scenes: Path, answer: Any, tmp_path: Path) -> None:
     _, lam = answer
     path = written(tmp_path / "lam.csv", lam, "lam")
@@ -228,6 +274,15 @@ def test_what_is_no_answer_of_this_problem_is_refused(name: str, scenes: Path, t
     assert message in done.stderr
 
 
+def test_forces_whose_displacements_overflow_are_refused(tmp_path: Path) -> None:
+    """As where the largest number stands for no value."""
+    scene = tmp_path / "soft.npz"
+    np.savez(scene, K=0.5 * np.eye(2), A=[[1.0], [-1.0]], f=[3.0, -1.0], g=[0.5])
+    done = harness("judge", written(tmp_path / "lam.npz", np.array([1.7e308]), "lam"), scene)
+    assert done.exit_code == 2, done.output
+    assert "lam.npz: lam[0] = 1.7e+308: forces whose displacements do not overflow" in done.stderr
+
+
 def read_mps(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, float]]:
     """P, q, G, h and the lower bounds of a free MPS file with QUADOBJ; z is free but for these."""
     section, rows, columns = "", list[str](), dict[str, int]()
@@ -286,14 +341,17 @@ def test_an_mps_file_has_the_program_and_its_optimum(
 
 
 def test_a_suite_is_a_test_set(scenes: Path, tmp_path: Path) -> None:
-    """As qpbenchmark reads it: P, G and A by rows with as many columns as q has entries."""
-    pytest.importorskip("pyarrow")
+    """As qpbenchmark reads it: P, G and A by rows with as many columns as q has entries. One program is in
+    memory at a time: each is a group of rows.
+    """
+    parquet = pytest.importorskip("pyarrow.parquet")
     suite = 'scenes = ["tiny.npz", "strip.toml"]\n[[solver]]\nname = "gi"\n'
     (scenes / "pair.toml").write_text(suite)
     out = tmp_path / "pair.parquet"
     assert harness("export", scenes / "pair.toml", "--form", "primal", "--out", out).exit_code == 0
     said = subprocess.run(["sha256sum", "-c", f"{out.name}.sha256"], cwd=tmp_path, capture_output=True)
     assert said.returncode == 0
+    assert parquet.ParquetFile(out).num_row_groups == 2
     problems = pd.read_parquet(out, engine="pyarrow")
     assert list(problems["name"]) == ["tiny", "strip"]
     assert set(problems.columns) == {"P", "q", "G", "h", "A", "b", "lb", "ub", "name"}

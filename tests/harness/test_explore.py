@@ -268,6 +268,22 @@ def test_a_dropped_fastener_is_solved_and_saved_to_the_micrometre(path: Path, tm
     assert Settings.of(scene_of(tmp_path / "moved.toml")) == page.answer.settings
 
 
+def test_a_file_that_has_changed_is_not_saved_with_the_answer_to_the_old_one(
+    path: Path, tmp_path: Path
+) -> None:
+    """An effect was added; what is no change of the scene, as a comment, is saved with it."""
+    scene, moved, text = tmp_path / "scene.toml", tmp_path / "moved.toml", path.read_text()
+    page = page_of(scene, text)
+    page.path.value = str(moved)
+    scene.write_text(text + PRESSURE.replace('"a"', '"b"'))
+    page.save()
+    assert "has changed since it was read: start explore again" in page.fault.text
+    assert not moved.exists()
+    scene.write_text(text + "# noted\n")
+    page.save()
+    assert moved.read_text().endswith("# noted\n")
+
+
 def test_a_saved_scene_finds_its_files(tmp_path: Path) -> None:
     """From another folder; comments and the title stay."""
     home, there = tmp_path / "home", tmp_path / "there"

@@ -7,6 +7,7 @@ import tomllib
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
+from hashlib import sha256
 from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
@@ -712,3 +713,26 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     study = FastenerStudy(movable.bare, Listed((load_case(movable.bare),)), "dual", movable)
     (found,) = PlanSession(study).answer(Question((movable.current,), (0,)))
     assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)
+
+
+@pytest.mark.parametrize("command", ["place", "shim"])
+@pytest.mark.usefixtures("without_pictures")
+def test_a_file_that_changes_during_the_search_changes_no_plan(
+    command: str, strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is written starts from the text that was read, and the hash of the input is that of it."""
+    scene, out = tmp_path / "strip.toml", tmp_path / "out"
+    scene.write_bytes(strip.read_bytes())
+
+    def searched(*of: Any) -> Any:
+        scene.write_text(strip.read_text().replace("preload = 40.0", "preload = 77.0"))
+        return search_in_rounds(*of)
+
+    module, name = {"place": ("placement.run", "own"), "shim": ("shimming.shim_run", "shimmed")}[command]
+    monkeypatch.setattr(f"harness.{module}.search_in_rounds", searched)
+    asked = ["--count", 1] if command == "place" else ["--stock", "0.02", "--patches", "2x1"]
+    words = ("--allow-gap", 1, "--cases", 2, "--share", 1, "--out", out)
+    assert harness(command, scene, *asked, *words).exit_code == 0
+    assert "preload = 40.0" in (out / f"{name}.toml").read_text()
+    record = json.loads((out / f"{command}.json").read_text())
+    assert record["inputs"]["strip.toml"] == sha256(strip.read_bytes()).hexdigest()

@@ -351,7 +351,8 @@ def test_the_case_that_ends_a_process_is_told_from_those_solved_at_once() -> Non
     [
         (["within", "within"], 0),
         (["within", "cannot_be_judged"], 3),
-        (["cannot_be_judged", "no_answer"], 3),
+        (["cannot_be_judged", "no_answer"], 1),
+        (["no_answer", "no_answer"], 1),
         (["within", "cannot_be_judged", "outside"], 1),
         (["within", "no_answer"], 1),
     ],

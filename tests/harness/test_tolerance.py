@@ -96,6 +96,15 @@ def test_the_ends_must_differ(tmp_path: Path, limit: float, code: int, said: str
     assert json.loads((tmp_path / "out" / "tolerance.json").read_text())["value"] is None
 
 
+def test_the_name_of_a_scene_is_no_markup(tmp_path: Path) -> None:
+    """Neither in the report nor in its picture, where it is no mathematics."""
+    path = write_strip(tmp_path).rename(tmp_path / "a$x_$ *b*.toml")
+    words = "--key", SD, "--range", "0.1:0.2", "--allow-gap", 9.0, "--cases", 3
+    assert harness("tolerance", path, *words, "--out", tmp_path / "out").exit_code == 0
+    report = (tmp_path / "out" / "report.md").read_text("utf-8")
+    assert report.startswith(f"# {SD} in a\\$x\\_\\$ \\*b\\*\n")
+
+
 def test_a_key_may_change_the_stiffness(tmp_path: Path) -> None:
     """Its series is that of a scene with the value."""
     cases = GapCases(count=3)

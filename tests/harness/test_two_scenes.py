@@ -16,6 +16,8 @@ from harness.scene.two_scenes import common_places
 from problems.build import load_case, prepared
 from problems.model.fastener_forces import fastener_forces
 from problems.scene_files import read_scene
+from report.page.answer_page_data import headline
+from report.results.answer_record import read
 
 FASTENERS = """
 [[effect]]
@@ -190,6 +192,25 @@ def test_the_mesh_decides_a_verdict_near_the_limit(tmp_path: Path) -> None:
     sides = ["FAIL" if gap.max() > between else "PASS" for gap in gaps]
     assert sides[0] != sides[1]
     assert f"the mesh decides: first {sides[0]}, second {sides[1]}" in done.output.replace("\n", " ")
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_the_page_of_two_meshes_says_what_each_answer_says(tmp_path: Path) -> None:
+    """The largest gap of the fine mesh is between the lines of the coarse one; nothing closes."""
+    places = [(20.0 * x, 20.0 * y) for y in range(5) for x in range(9)]
+    points = [[x, y, 0.3 if (x, y) == (20.0, 20.0) else 0.1] for x, y in places]
+    gap = f'[[effect]]\nkind = "measured_gap"\npoints = {points}\n'
+    scenes = []
+    for name, nodes in (("coarse", (5, 3)), ("fine", (9, 5))):
+        scenes.append(write(tmp_path / f"{name}.toml", two_parts(160.0, 80.0, nodes, "south") + gap))
+    assert harness("solve", *scenes, "--out", tmp_path, "--allow-gap", 0.2).exit_code == 4
+    common = [float(row["gap_after_second_mm"]) for row in rows(tmp_path / "contacts.csv")]
+    assert max(common) == pytest.approx(0.1)
+    page = (tmp_path / "index.html").read_text("utf-8")
+    for name, largest in (("first", "0.100 mm"), ("second", "0.300 mm")):
+        sentence = headline(*read(tmp_path / name))["text"]
+        assert f"the largest gap left is {largest}" in sentence
+        assert sentence in page
 
 
 def test_the_starter_is_a_scene_that_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

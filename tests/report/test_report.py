@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from commands import harness
 from synthetic_results import no_answer, results, row, table, write_rows
 
 from report.analysis.standings import shown, standings
@@ -16,7 +17,7 @@ from report.document.numbers import significant
 from report.results.reader import Results, read
 from report.sections import profile
 from report.sections.speed import contacts
-from report.sections.summary import EACH, PREPARED, advice, explained, summary
+from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard, summary
 from report.writers.suite_report import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -74,6 +75,14 @@ def test_a_failure_counts_with_the_largest_limit_on_its_scene(tmp_path: Path) ->
     assert lines.to_dict() == pytest.approx({"a (dual)": 100.0, "b (dual)": 100.0, "c (dual)": 30.0})
 
 
+@pytest.mark.parametrize(("limit_s", "text"), [(0.4, "> 0.4 s"), (3600.0, "> 3600 s")])
+def test_a_time_limit_is_shown_with_its_digits(limit_s: float, text: str, tmp_path: Path) -> None:
+    late = no_answer("time_limit") | {"time_limit_s": limit_s}
+    cells = results(tmp_path, [row(LOW, "a"), row(LOW, "b", **late)]).cells
+    drawing = scoreboard(cells, standings(cells))
+    assert text in [one.get_text() for axes in drawing.axes for one in axes.texts]
+
+
 def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_path: Path) -> None:
     seconds = {"a": (1.0, 2.0, 8.0, 1.0), "b": (3.0, 1.0, 4.0, None)}
     rows = [
@@ -122,6 +131,41 @@ def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
     assert text.index("## Summary: First") < text.index("## Summary: Second")
     own = pd.read_csv(tmp_path / "report" / "machine2-summary.csv")
     assert own["load_case_s_4386"].tolist() == pytest.approx([9.0])
+
+
+@pytest.mark.parametrize("owner", [{}, {"owner": None}, {"owner": "theirs"}])
+@pytest.mark.usefixtures("without_pictures")
+def test_foreign_rows_are_shown(owner: dict[str, Any], tmp_path: Path) -> None:
+    """With no owner or another, which comes last; the names of scenes have fewer parts than ours, or more."""
+    rows = []
+    for solver in ("a", "gi"):
+        for scene in ("4386/0100", "hard/x", "hard/steep/1e5/b", "outside/x", "outside/membrane/8/b"):
+            rows.append({**row(LOW, solver, objective=-1.0, key=f"{scene} {solver}"), "scene": scene})
+    for each in rows[:5]:
+        del each["owner"]
+        each |= owner
+    folder = write_rows(tmp_path / "run", rows)
+    size = {"title": "made up", "n": 4386, "m": 2193, "printed_objective": -1.0}
+    problems = [{"scene": one["scene"], **size} for one in rows[:5]]
+    (folder / "problems.jsonl").write_text("".join(json.dumps(each) + "\n" for each in problems), "utf-8")
+    report, merged = harness("report", folder), harness("merge", folder, "--out", tmp_path / "merged")
+    assert (report.exit_code, merged.exit_code) == (0, 0), report.output + merged.output
+    for directory in (folder, tmp_path / "merged"):
+        lines = pd.read_csv(directory / "report" / "honesty.csv")
+        assert lines["label"].tolist() == ["gi (dual)", "a (dual)"]
+        assert lines["rungs"].tolist() == [2, 2]
+
+
+def test_a_report_that_cannot_be_made_leaves_the_older_one(
+    tiny: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tiny / "report").mkdir()
+    for name, text in (("report.md", "![an older one](a.png)"), ("a.png", "")):
+        (tiny / "report" / name).write_text(text)
+    monkeypatch.setattr("report.writers.suite_report.run_data", None)
+    with pytest.raises(TypeError):
+        write(tiny)
+    assert sorted(path.name for path in (tiny / "report").iterdir()) == ["a.png", "report.md"]
 
 
 @pytest.mark.usefixtures("without_pictures")

@@ -20,6 +20,7 @@ from report.sections.ladders import (
     WRONG_UNCLAIMED,
     claims,
     rungs_in_order,
+    section,
     with_outcomes,
 )
 from report.writers.suite_report import write
@@ -112,3 +113,8 @@ def test_rungs_and_scenes_are_reported_apart(report: Path, tmp_path: Path) -> No
 def test_rungs_that_the_suite_does_not_list_come_as_they_were_measured(tmp_path: Path) -> None:
     found = results(tmp_path, [row(HARD, "ipm"), row(EASY, "ipm")])
     assert rungs_in_order(found, found.cells) == {"steep": ["1e9", "1e1"]}
+
+
+def test_a_scene_without_the_name_of_a_rung_is_drawn(tmp_path: Path) -> None:
+    """As of another version's ladder: alone, it leaves no text below its column."""
+    assert section(results(tmp_path, [row("hard/x", "a")])) is not None
