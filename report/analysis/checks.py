@@ -26,6 +26,12 @@ def warnings(results: Results) -> list[str]:
             f"The rows come from {machines.nunique()} machines: {_with_rows(machines)}. "
             "They are reported one after the other; no table, mean or figure mixes them."
         )
+    keys = rows[rows["scene_key"] != ""].groupby("scene")["scene_key"].nunique()
+    if changed := [str(scene) for scene in keys.index[keys > 1]]:
+        doubts.append(
+            f"Rows of {listed(changed)} are of several problems of that name, as of a file that has changed: "
+            "their times cannot be compared."
+        )
     doubts += _unfinished(results)
     for solver, versions in _several(rows[~asked_for(rows)], "solver_version").items():
         doubts.append(f"{solver} was run in several versions: {listed(versions)}.")

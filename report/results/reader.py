@@ -136,7 +136,7 @@ def read(directory: Path) -> Results:
     left_out, again = len(records) - len(rows), rows["round"] != ""
     rows, rounds = (rows[of].reset_index(drop=True) for of in (~again, again))
     read = rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out
-    return Results(directory, *read, rounds, frame(old, VERSION))
+    return Results(directory, *read, rounds, frame(old, [*VERSION, "scene_key"]))
 
 
 def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dict[str, Any]:

@@ -134,6 +134,19 @@ def test_all_rows_are_set_aside_in_one_pass(copy: Path) -> None:
     assert len(records.read(copy / records.OUTDATED)) == len(rows)
 
 
+def test_no_row_of_a_scene_that_has_changed_stays(copy: Path) -> None:
+    """Whatever its solver and round, planned or not; those of the scene as it is, and of others, do."""
+    first = rows_of(copy)[0]
+    others = [first | {"key": f"tiny other {k}", "solver": "other"} for k in range(3)]
+    others[1] |= {"round": "2026-01-01T00:00:00+00:00", "solver": "newton"}
+    others[2] |= {"key": "changed other", "scene": "changed", "scene_key": "another"}
+    old = [row | {"scene_key": "older"} for row in others[:2]]
+    plan = expand(read_written(copy / "suite.toml"))
+    solvers = {("exact", ""): Description(["dual"], "1", "code")}
+    assert resumed(copy, [*others, *old], plan, solvers, Console(quiet=True)) == others == rows_of(copy)
+    assert [row["key"] for row in records.read(copy / records.OUTDATED)] == [row["key"] for row in old]
+
+
 @pytest.mark.parametrize("suite_is_read", [True, False])
 def test_a_run_that_leaves_out_missing_rows_is_refused(copy: Path, folder: Path, suite_is_read: bool) -> None:
     """The gate would no longer miss them. Once they are there, it may go on."""
