@@ -46,6 +46,7 @@ class Results:
     left_out: int = 0  # rows of equal measurements, and of tolerances tried in a search for one
     rounds: pd.DataFrame = field(default_factory=lambda: frame([]))
     outdated: pd.DataFrame = field(default_factory=lambda: frame([]))
+    one_of_several: bool = False  # whether other machines made the rest of the rows
 
     @property
     def title(self) -> str:
@@ -109,7 +110,8 @@ class Results:
             )
             problems = self.problems[of.isna() | (of == name)]
             cells = cells_of(rows)
-            return replace(self, rows=rows, cells=cells, problems=problems, rounds=rounds, outdated=outdated)
+            own = replace(self, rows=rows, cells=cells, problems=problems, rounds=rounds, outdated=outdated)
+            return replace(own, one_of_several=True)
 
         return [part(name) for name in names]
 

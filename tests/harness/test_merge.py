@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs
 
 import pytest
 from commands import harness
@@ -55,6 +56,8 @@ def test_no_ratio_is_of_two_machines(both: tuple[Path, Path], tmp_path: Path) ->
     assert not any(723 * 0.99 < each < 723 * 1.01 or 0 < abs(each - 1 / 723) < 1e-5 for each in numbers)
     assert f"Summary: {FAST}" in text
     assert f"Summary: {SLOW}" in text
+    links = map(parse_qs, re.findall(r"\]\(index\.html#([^)]+)\)", text))
+    assert [link["machine"] for link in links if link["row"] == [SHARED["key"]]] == [[FAST], [SLOW]]
     results = read(out)
     for part in results.by_machine():
         seconds = 2.0 if part.rows["machine"].iloc[0] == FAST else 1446.0

@@ -270,6 +270,21 @@ def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:
     assert parse_qs(chromium.execute_script("return location.hash.slice(1)"))["row"] == [keys[0]]
 
 
+def test_a_row_is_of_the_machine_that_is_named_or_chosen(chromium: Any, tmp_path: Path) -> None:
+    names, key = ("One CPU", "Other CPU"), "4386/0052 ipm"
+    rows = [row(key=key, machine=name, solve_s=1.0 + k) for k, name in enumerate(names)]
+    page = write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows)))
+    shown = "return dialog.open ? [...dialog.querySelectorAll('td')].map(td => td.textContent) : []"
+    for name, other in (names, names[::-1]):
+        opened(chromium, page, urlencode({"row": key, "machine": name}))
+        found = chromium.execute_script(shown)
+        assert (name in found, other in found) == (True, False)
+        opened(chromium, page)
+        chosen(chromium, "machine", name)
+        chromium.execute_script(f"{SEEN}[0].click()")
+        assert name in chromium.execute_script(shown)
+
+
 def test_a_ladder_says_where_a_solver_breaks(chromium: Any, tmp_path: Path) -> None:
     rungs = {"1e+00": "within", "1e-02": "no_answer", "1e-04": "outside"}
     rows = [row(verdict=verdict) | {"scene": f"hard/supports/{name}"} for name, verdict in rungs.items()]
