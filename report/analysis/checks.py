@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.results.provenance import provenance
+from report.document.escape import plain
 from report.document.numbers import counted, listed
 from report.results.reader import Results
 
@@ -115,7 +116,9 @@ def _unfinished(results: Results) -> list[str]:
         if solver.get("name") not in libraries
         for source in suite.get("scenes", [])
         if (scene := names.get(source, source)) not in refused
-        and any(fnmatchcase(scene, glob) or glob == source for glob in solver.get("scenes", ["*"]))
+        and any(
+            fnmatchcase(plain(scene), plain(glob)) or glob == source for glob in solver.get("scenes", ["*"])
+        )
         for form in solver.get("forms", [ANY])
     }
     whole = rows[rows["iteration_limit"].isna()]

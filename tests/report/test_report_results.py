@@ -116,6 +116,14 @@ def test_rows_that_the_suite_does_not_plan_finish_no_run(tmp_path: Path) -> None
     assert unfinished(tmp_path / "whole", suite, there, there | {"scene": HIGH}) == []
 
 
+def test_a_row_that_a_glob_of_the_suite_plans_is_missed(tmp_path: Path) -> None:
+    for k, globs in enumerate(('["4386/*"]', '["4386/[0-1]*"]', '["*", "6112/*"]')):
+        suite = f'[[solver]]\nname = "a"\nscenes = {globs}\n'
+        (doubt,) = unfinished(tmp_path / f"lacks {k}", suite, row(LOW, "a"))
+        assert "1 of 2 combinations" in doubt
+        assert unfinished(tmp_path / f"has {k}", suite, row(LOW, "a"), row(HIGH, "a")) == []
+
+
 def test_a_file_is_the_scene_that_its_rows_name(tmp_path: Path) -> None:
     suite = '[[solver]]\nname = "a"\nscenes = ["4386/*"]\n'
     rows = [row(LOW, "a", source=LOW), row(HIGH, "a", source="/x/high.toml")]
