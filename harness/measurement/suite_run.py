@@ -132,7 +132,7 @@ class Measuring:
             rows = rows_of(task, outcome, problem, self.directory, origin)
             name = problem.scene.name, form_family(problem.form)
             if name not in recorded:
-                record(problem, self.directory)
+                record(problem, self.directory, self.origin["machine"])  # opened and proven here
                 recorded.add(name)
             records.append(self.directory / records.MEASUREMENTS, *rows)
             self.rows += rows

@@ -90,7 +90,8 @@ def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
         assert problem["cond_K"] == pytest.approx(eigenvalues[-1] / eigenvalues[0])
         assert problem["active"] == np.count_nonzero(arrays["gap_after"] < 1e-12) == rows[0]["active"]
         assert np.array_equal(arrays["gap_before"], source["g"])
-    assert json.loads((finished / "machine.json").read_text())["machine"] == rows[0]["machine"]
+    machine = json.loads((finished / "machine.json").read_text())["machine"]
+    assert machine == rows[0]["machine"] == problem["machine"]
 
 
 def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
