@@ -13,7 +13,7 @@ from synthetic_results import row
 from typer.testing import Result
 
 from harness.results import records
-from harness.results.comparison import Side, measurement
+from harness.results.comparison import Incomparable, Side, measurement
 from harness.results.records import Row
 from harness.verification.findings import Baseline, Finding, read_baseline, write_junit
 from harness.verification.judge import Judgement
@@ -206,6 +206,17 @@ def test_single_runs_tell_nothing_of_times() -> None:
     first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
     with pytest.raises(InputError, match="3 repeats of two solvers"):
         slowdowns(Side("old", timed(first, [1.0], [2.0])), Side("new", timed(first, [9.0], [2.0])), 1.5)
+
+
+@pytest.mark.parametrize("mixed", ["old", "new"])
+def test_no_median_is_of_two_machines(mixed: str) -> None:
+    """One of the three repeats is of another, on one of the sides."""
+    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
+    sides = {name: Side(name, timed(first, *BEFORE)) for name in ("old", "new")}
+    sides[mixed].rows[-1]["machine"] = "another"
+    with pytest.raises(Incomparable, match=rf"{mixed}: machine = .*another.*one machine") as raised:
+        slowdowns(**sides, limit=1.5)
+    assert "Made-up CPU" in str(raised.value)
 
 
 def test_a_slower_solver_does_not_pass(copy: Path, tmp_path: Path) -> None:
