@@ -17,6 +17,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import inf
 
+import pandas as pd
+
 from harness.results.comparison import Incomparable, Side, measurement
 from problems.errors import InputError
 from report.analysis.comparison import ENOUGH, compared
@@ -47,11 +49,17 @@ def slowdowns(old: Side, new: Side, limit: float) -> Times:
     frames = [frame([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)]
     table = compared(frames[0], frames[1], True, inf, limit)
     table = table[(table[["repeats_old", "repeats_new"]].min(axis=1) >= ENOUGH) & table["ratio"].notna()]
-    pairs = table.merge(table, on="scene_new", suffixes=("", "_other"))
-    pairs = pairs[pairs["solver_new"] != pairs["solver_new_other"]]
-    lines = pairs.groupby("measurement")[["ratio", "ratio_least", "ratio_other", "ratio_most_other"]].median()
-    if lines.empty:
+    beside: list[pd.DataFrame] = []
+    for _, of_scene in table.groupby("scene_new"):
+        for solver, own in of_scene.groupby("solver_new"):
+            others = of_scene[of_scene["solver_new"] != solver]
+            if len(others):
+                middle = others[["ratio", "ratio_most"]].median()
+                own = own.assign(ratio_other=middle["ratio"], ratio_most_other=middle["ratio_most"])
+                beside.append(own.set_index("measurement"))
+    if not beside:
         raise InputError.one("--max-slowdown", "factor", limit, f"{NEEDED}: --repeat {ENOUGH}")
+    lines = pd.concat(beside)
     S = lines["ratio"] / lines["ratio_other"]
     slower = S[(limit < S) & (lines["ratio_least"] > lines["ratio_most_other"])]
     return Times({*map(str, lines.index)}, {str(name): float(each) for name, each in slower.items()})

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import pandas as pd
 import pytest
 from commands import harness
 from suite_runs import changed, moved, rows_of
@@ -200,6 +201,18 @@ def test_times_are_compared_beside_other_solvers(
     found = slowdowns(old, new, 1.5)
     assert found.slower == ({} if slowdown is None else {measurement(first): pytest.approx(slowdown)})
     assert measurement(first) in found.compared
+
+
+def test_no_pair_of_a_scenes_measurements_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The load cases of a series are measurements of one scene: their square filled the memory."""
+    monkeypatch.setattr(pd.DataFrame, "merge", None)
+    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
+    cases = [timed(first | {"case": k}, [1.0 + k, 1.1 + k, 1.2 + k], [2.0, 2.1, 2.2]) for k in range(3)]
+    old = [row for case in cases for row in case]
+    slower = [row | {"solve_s": row["solve_s"] * (3 if row["solver"] == "exact" else 1)} for row in old]
+    found = slowdowns(Side("old", old), Side("new", slower), 1.5)
+    assert set(found.slower.values()) == {pytest.approx(3.0)}
+    assert (len(found.slower), len(found.compared)) == (3, 6)
 
 
 def test_single_runs_tell_nothing_of_times() -> None:
