@@ -159,6 +159,28 @@ def test_the_slider_judges_again(chromium: Any, made: tuple[pd.DataFrame, Path])
         assert all((rank is None) == (within == 0) for within, rank in lines)  # none without an answer
 
 
+def test_the_limit_of_the_rows_is_that_of_the_page_with_all_its_digits(chromium: Any, tmp_path: Path) -> None:
+    """1.24e-7 mm is 1.2e-7 in two digits, and 1.26e-7 mm 1.3e-7."""
+    for limit, error, verdict in ((1.24e-7, 1.22e-7, "within"), (1.26e-7, 1.28e-7, "outside")):
+        judged_at = {"limit_mm": limit, "limit_asked_mm": limit}
+        rows = [row(displacement_error_mm=error, verdict=verdict, **judged_at)]
+        opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))))
+        assert chromium.execute_script("return filtered().map(cell => cell.judged)") == [verdict]
+        before = chromium.execute_script("return at('limit')")
+        chosen(chromium, "limit", "12")
+        assert chromium.execute_script("return filtered().map(cell => cell.judged)") == ["cannot_be_judged"]
+        chosen(chromium, "limit", before)
+        assert chromium.execute_script("return filtered().map(cell => cell.judged)") == [verdict]
+
+
+def test_an_answer_without_seconds_is_within_the_limit_all_the_same(chromium: Any, tmp_path: Path) -> None:
+    rows = [row(setup_s=0.0, solve_s=0.0, form_s=0.0), row(solver="gi")]
+    rows.append(row(solver="gi", scene="4386/1074", verdict="outside", displacement_error_mm=1e-6))
+    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))))
+    script = "return ranking(filtered()).map(line => [line.name, line.within, line.scenes, line.rank])"
+    assert chromium.execute_script(script) == [["ipm (dual)", 1, 1, 1], ["gi (dual)", 1, 2, 2]]
+
+
 def test_a_column_sorts_up_and_down(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
     """Cells that are not within the limit stay last, either way up."""
     cells, page = made
