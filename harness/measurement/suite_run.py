@@ -1,9 +1,9 @@
 """Runs a suite: scene by scene, one worker process and one row per measurement, resumable at any point."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from math import inf
@@ -14,7 +14,7 @@ from rich.console import Console
 
 from harness.planning.plan import Measurement, expand, of_key, round_beside, with_key
 from harness.planning.suite import Suite
-from harness.planning.tolerance_search import still_needed, unmeasured
+from harness.planning.tolerance_search import by_solver, still_needed, unmeasured
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
@@ -110,13 +110,20 @@ def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Ite
 
 @dataclass
 class Measuring:
-    """Makes measurements and appends their rows to `rows` and to the files of the directory."""
+    """Makes measurements and appends their rows to `rows` and to the files of the directory.
+
+    of_solver : the rows of each solver.
+    """
 
     directory: Path
     rows: list[Row]
     solvers: Solvers
     origin: Origin
     display: Display
+    of_solver: defaultdict[str, list[Row]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.of_solver = by_solver(self.rows)
 
     def measure(self, remaining: list[Measurement], outcomes: Outcomes) -> None:
         """Make the measurements of a plan that are still needed when their turn comes."""
@@ -136,6 +143,7 @@ class Measuring:
                 recorded.add(name)
             records.append(self.directory / records.MEASUREMENTS, *rows)
             self.rows += rows
+            self.of_solver[task.batch[0].solver] += rows
             for row in rows:
                 self.display.finished(row)
 
@@ -162,7 +170,7 @@ class Measuring:
         """The batches that are still needed when their turn comes, and rounds before what is not ours."""
         began = dict[str, datetime]()  # the last round on each scene
         for batch in batches(remaining):
-            m = still_needed(batch[0], self.rows)
+            m = still_needed(batch[0], self.of_solver[batch[0].solver])
             if m is None:
                 self.display.advance(len(batch))
                 continue

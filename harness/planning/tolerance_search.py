@@ -7,6 +7,7 @@ as its best on the first scene of the next smaller size; on the other scenes in 
 took at most a tenth of the time limit.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, sqrt
@@ -26,12 +27,23 @@ LITTLE = sqrt(10)  # times the limit: an error that half a decade may mend
 
 def unmeasured(plan: Sequence[Measurement], rows: Sequence[Row]) -> list[Measurement]:
     """The measurements of a plan that need a row and have none."""
-    done = {row["key"] for row in rows}
-    return [m for m in plan if m.key not in done and still_needed(m, rows) is not None]
+    done, of_solver = {row["key"] for row in rows}, by_solver(rows)
+    return [m for m in plan if m.key not in done and still_needed(m, of_solver[m.solver]) is not None]
+
+
+def by_solver(rows: Sequence[Row]) -> defaultdict[str, list[Row]]:
+    """The rows of each solver. Those of a measurement's solver are all that decides on it."""
+    found: defaultdict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        found[str(row.get("solver"))].append(row)
+    return found
 
 
 def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
-    """The measurement in m's place in the plan, at the next tolerance of a search; None if there is none."""
+    """The measurement in m's place in the plan, at the next tolerance of a search; None if there is none.
+
+    rows : those of m's solver, perhaps among others, which only take time.
+    """
     if m.guide is None and m.iteration_limit is None and not (m.searched or m.paced):
         return m
     if not in_a_good_form(m, rows):
@@ -56,7 +68,9 @@ def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
 
 def in_a_good_form(m: Measurement, rows: Sequence[Row]) -> bool:
     """Whether m's form was good enough on the scene that guides m, or nothing is known of it there."""
-    scene, times, most_s = m.guide or ("", inf, inf)
+    if m.guide is None:
+        return True
+    scene, times, most_s = m.guide
     seconds: dict[str, float] = {}
     for row in rows:
         there = row["scene"] == scene and row.get("owner") == "library"

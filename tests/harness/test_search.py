@@ -14,7 +14,13 @@ from harness.measurement.suite_run import run
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import HALF_DECADES, Measurement, expand
 from harness.planning.suite import read_suite, suite_from
-from harness.planning.tolerance_search import START, next_tolerance, still_needed
+from harness.planning.tolerance_search import (
+    START,
+    in_a_good_form,
+    next_tolerance,
+    still_needed,
+    unmeasured,
+)
 from harness.results.records import MEASUREMENTS, Row, rewrite
 from harness.verification.gate import gate
 from problems.errors import InputError
@@ -185,6 +191,13 @@ def test_rows_are_read_only_for_what_they_may_leave_out(tmp_path: Path) -> None:
     assert still_needed(m, Unread()) == m
     with pytest.raises(AssertionError):
         still_needed(expand(suite_of(tmp_path))[0], Unread())
+
+
+def test_what_is_missing_is_decided_by_the_rows_of_its_solver_alone(tmp_path: Path) -> None:
+    """The rows of all would be read for every measurement of a plan, whose forms may all be good."""
+    plan = expand(suite_of(tmp_path))
+    assert unmeasured(plan, [{"key": "of another", "solver": "another"}]) == plan
+    assert in_a_good_form(plan[0], Unread())
 
 
 def test_tolerances_of_the_command_line() -> None:
