@@ -66,6 +66,31 @@ def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
     return m
 
 
+#: A scene, a form or None for any, a solver, its label and threads.
+Cell = tuple[str, str | None, str, str, int]
+
+
+def cell_of(m: Measurement) -> Cell:
+    return m.scene, m.form, m.solver, m.entry.label, m.threads
+
+
+def decided_by(m: Measurement) -> set[Cell]:
+    """The cells whose rows `still_needed` asks for: it cannot tell while one of them is being measured."""
+    cells = set[Cell]()
+    if m.searched or m.paced or m.iteration_limit is not None:
+        cells.add(cell_of(m))
+    if m.guide:
+        cells.add((m.guide[0], None, *cell_of(m)[2:]))
+    return cells
+
+
+def decides_on(m: Measurement) -> set[Cell]:
+    """The cells of m whose rows may decide on others: none of a repeat, or of a run that a trace stops."""
+    if m.repeat or m.iteration_limit is not None:
+        return set()
+    return {cell_of(m), (m.scene, None, *cell_of(m)[2:])}
+
+
 def in_a_good_form(m: Measurement, rows: Sequence[Row]) -> bool:
     """Whether m's form was good enough on the scene that guides m, or nothing is known of it there."""
     if m.guide is None:
@@ -94,11 +119,12 @@ def next_tolerance(m: Measurement, rows: Sequence[Row]) -> float | None:
     """
     same = [row for row in rows if (row["solver"], row["form"]) == (m.solver, m.form) and not row["repeat"]]
     searched = [row for row in same if row["tolerance"] in HALF_DECADES]
-    tried = {HALF_DECADES.index(row["tolerance"]): row for row in _of_cell(m, searched)}
+    own = _of_cell(m, searched)  # perhaps several of a tolerance, as workers once made them
+    tried = {HALF_DECADES.index(row["tolerance"]): row for row in own}
     if not tried:
         decades = [row["tolerance"] for row in searched if row["tolerance"] in HALF_DECADES[::DECADE]]
         return float(decades[-1]) if decades else START
-    enough = 2 if len(tried) == len(searched) else 1
+    enough = 2 if len(own) == len(searched) else 1
     if len(tried) >= enough and all(row["status"] in EXCEEDED for row in tried.values()):
         return None
     within = [k for k, row in tried.items() if row["verdict"] == "within"]
