@@ -41,7 +41,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
             machine = side.rows[0].get("machine")
             for file in sorted(folder.glob("machine*.json")):
                 record_machine(out, records.parsed(file.read_bytes()))
-            problems = records.read(folder / PROBLEMS)  # of a merged run each has its machine
+            problems = records.read(folder / PROBLEMS)  # older ones do not name their machine
             problems = [row | {"machine": row.get("machine") or machine} for row in problems]
             records.append(out / PROBLEMS, *problems)
             for file in (*folder.glob("scenes/*.npz"), *folder.glob(SUITE)):

@@ -193,17 +193,21 @@ def refuse_lost_workers(ended: BaseException) -> None:
 
 
 def done_as_completed(
-    executor: Executor, count: int, work: Callable[[S], R], tasks: Iterable[tuple[T, S]]
+    executor: Executor, count: int, work: Callable[[S], R], tasks: Iterable[tuple[T, S] | None]
 ) -> Iterator[tuple[T, R | BaseException]]:
     """Each task with its result, or with its exception, as they end; only a few are submitted at a time.
 
-    tasks : pairs of an object that stays here, to identify the task, and the argument of `work`.
+    tasks : pairs of an object that stays here, to identify the task, and the argument of `work`; None where
+    the next one depends on one that is being done.
     """
     remaining = iter(tasks)
     running: dict[Future[R], T] = {}
     ended: SimpleQueue[Future[R]] = SimpleQueue()  # Ctrl-C within `wait` would leave futures locked
     while True:
-        for task, sent in remaining:
+        for pair in remaining:
+            if pair is None:
+                break
+            task, sent = pair
             future = executor.submit(work, sent)
             running[future] = task
             future.add_done_callback(ended.put)

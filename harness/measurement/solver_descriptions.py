@@ -167,13 +167,18 @@ def rows_in(directory: Path, console: Console) -> list[Row]:
 def resumed(
     directory: Path, rows: list[Row], plan: list[Measurement], solvers: Solvers, console: Console
 ) -> list[Row]:
-    """The valid ones of the rows of DIRECTORY; outdated ones are moved to a file of their own."""
+    """The valid ones of the rows of DIRECTORY; outdated ones are moved to a file of their own.
+
+    On a scene of the plan that has changed, these are the rows of all solvers and rounds, planned or not.
+    """
     planned = {m.key: m for m in plan}
     sources = {m.scene: m.source for m in plan}
     scene_keys = {name: read_scene(source).key for name, source in sources.items()}
 
     def is_old(row: Row) -> bool:
-        m = planned.get(row["key"])
+        m, scene_key = planned.get(row["key"]), scene_keys.get(row["scene"])
+        if scene_key and (row.get("scene_key") or scene_key) != scene_key:
+            return True
         return m is not None and outdated(row, m, solvers[m.solver, m.entry.label], scene_keys[m.scene])
 
     valid: list[Row] = []
@@ -183,7 +188,7 @@ def resumed(
     if old:
         records.append(directory / records.OUTDATED, *(row | {"answer": None, "log": None} for row in old))
         records.rewrite(directory / records.MEASUREMENTS, valid)
-        aside = f"Set aside in {records.OUTDATED}, to be measured again: {counted(len(old), 'row')}"
+        aside = f"Set aside in {records.OUTDATED}: {counted(len(old), 'row')}"
         why = "because the scene, the solver or the limits have changed since"
         console.print(f"{aside}, {why}.", style="yellow")
     return valid

@@ -1,9 +1,9 @@
 """Runs a suite: scene by scene, one worker process and one row per measurement, resumable at any point."""
 
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from math import inf
@@ -14,7 +14,15 @@ from rich.console import Console
 
 from harness.planning.plan import Measurement, expand, of_key, round_beside, with_key
 from harness.planning.suite import Suite
-from harness.planning.tolerance_search import still_needed, unmeasured
+from harness.planning.tolerance_search import (
+    Cell,
+    by_solver,
+    cell_of,
+    decided_by,
+    decides_on,
+    still_needed,
+    unmeasured,
+)
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
@@ -95,14 +103,18 @@ ROUND_LASTS = timedelta(hours=1)
 #: A task that is being done, and the problem that its answers are judged on.
 Pending = tuple[Task, ReferenceProblem]
 #: Does tasks, each beside what stays here; gives back the latter with the result, or with the exception.
-Outcomes = Callable[[Iterator[tuple[Pending, Task]]], Iterator[tuple[Pending, TaskResult | BaseException]]]
+#: None stands for a task that cannot be chosen before one that is being done has ended.
+Outcomes = Callable[
+    [Iterator[tuple[Pending, Task] | None]], Iterator[tuple[Pending, TaskResult | BaseException]]
+]
 
 
 @contextmanager
 def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Iterator[Outcomes]:
     """One measurement after another here, or one at a time on each worker of a scheduler."""
     if scheduler is None:
-        yield lambda tasks: ((pending, run_task(task, directory / "answers")) for pending, task in tasks)
+        answers = directory / "answers"
+        yield lambda tasks: ((pending, run_task(task, answers)) for pending, task in filter(None, tasks))
         return
     with workers(scheduler, console) as (executor, count):
         yield partial(done_as_completed, executor, count, run_task_on_worker)
@@ -110,21 +122,33 @@ def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Ite
 
 @dataclass
 class Measuring:
-    """Makes measurements and appends their rows to `rows` and to the files of the directory."""
+    """Makes measurements and appends their rows to `rows` and to the files of the directory.
+
+    of_solver : the rows of each solver. running : what is being measured. lost : searches that cannot go on.
+    """
 
     directory: Path
     rows: list[Row]
     solvers: Solvers
     origin: Origin
     display: Display
+    of_solver: defaultdict[str, list[Row]] = field(init=False)
+    running: dict[str, Measurement] = field(default_factory=dict)
+    lost: set[Cell] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.of_solver = by_solver(self.rows)
 
     def measure(self, remaining: list[Measurement], outcomes: Outcomes) -> None:
         """Make the measurements of a plan that are still needed when their turn comes."""
         recorded = set[tuple[str, str]]()
         for (task, problem), outcome in outcomes(self.tasks(remaining)):
+            first = task.batch[0]
+            self.running.pop(first.key, None)
             if isinstance(outcome, BaseException):
+                self.lost |= {cell_of(first)} if first.searched else set()
                 why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
-                self.display.console.print(f"{task.batch[0].key}: not measured: {why}", style="red")
+                self.display.console.print(f"{first.key}: not measured: {why}", style="red")
                 continue
             origin = self.origin
             if outcome.machine and outcome.code:
@@ -132,18 +156,23 @@ class Measuring:
             rows = rows_of(task, outcome, problem, self.directory, origin)
             name = problem.scene.name, form_family(problem.form)
             if name not in recorded:
-                record(problem, self.directory)
+                record(problem, self.directory, self.origin["machine"])  # opened and proven here
                 recorded.add(name)
             records.append(self.directory / records.MEASUREMENTS, *rows)
             self.rows += rows
+            self.of_solver[first.solver] += rows
             for row in rows:
                 self.display.finished(row)
 
-    def tasks(self, remaining: list[Measurement]) -> Iterator[tuple[Pending, Task]]:
+    def tasks(self, remaining: list[Measurement]) -> Iterator[tuple[Pending, Task] | None]:
         """One task after another; a scene is opened before its first task of a family of forms."""
         opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
         made = set[str]()  # the forms whose matrices are made
-        for m, *others in self.due(remaining):
+        for batch in self.due(remaining):
+            if batch is None:
+                yield None
+                continue
+            m = batch[0]
             if any(problem.scene.name != m.scene for problem in opened.values()):
                 opened, made = {}, set()
             family = form_family(m.form)
@@ -155,15 +184,24 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task([m, *others], self.solvers[m.solver, m.entry.label])
+            task = Task(batch, self.solvers[m.solver, m.entry.label])
+            self.running[m.key] = m
             yield (task, problem), task
 
-    def due(self, remaining: list[Measurement]) -> Iterator[list[Measurement]]:
-        """The batches that are still needed when their turn comes, and rounds before what is not ours."""
+    def due(self, remaining: list[Measurement]) -> Iterator[list[Measurement] | None]:
+        """The batches that are still needed when their turn comes, and rounds before what is not ours; None
+        where all that is left depends on rows that are being made.
+        """
         began = dict[str, datetime]()  # the last round on each scene
-        for batch in batches(remaining):
-            m = still_needed(batch[0], self.rows)
-            if m is None:
+        waiting = batches(remaining)
+        while waiting:
+            place = self.next_place(waiting)
+            if place is None:
+                yield None
+                continue
+            batch = waiting.pop(place)
+            m = still_needed(batch[0], self.of_solver[batch[0].solver])
+            if m is None or (m.searched and cell_of(m) in self.lost):
                 self.display.advance(len(batch))
                 continue
             ours = m.entry.beside or self.solvers[m.solver, m.entry.label].owner == "ours"
@@ -177,6 +215,15 @@ class Measuring:
                 self.display.added(len(again))
                 yield from ([each] for each in again)
             yield [replace(m, beside_round=began[m.scene].isoformat(timespec="seconds"))]
+
+    def next_place(self, waiting: Sequence[Sequence[Measurement]]) -> int | None:
+        """The first that depends on nothing that is being measured or waits before it; None if all do."""
+        undecided = set[Cell]().union(*map(decides_on, self.running.values()))
+        for place, batch in enumerate(waiting):
+            if not undecided & decided_by(batch[0]):
+                return place
+            undecided |= decides_on(batch[0])
+        return None
 
 
 def batches(remaining: list[Measurement]) -> list[list[Measurement]]:

@@ -11,6 +11,7 @@ forms = ["dual"]
 import re
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -43,7 +44,7 @@ from problems.input.bounded_types import (
 )
 from problems.ladders import prefix_of, rung_names
 from problems.random_scenes import EXAMPLES, drawn_names
-from problems.scene_files import read_toml, scene_names
+from problems.scene_files import read_scene, read_toml, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names
 
@@ -176,7 +177,10 @@ def read_suite(name_or_path: str) -> Suite:
         path = SUITES / f"{name_or_path}.toml"
         if not path.is_file():
             raise InputError.one("SUITE", "name", name_or_path, unknown("suite", name_or_path, suite_names()))
-    return suite_from(read_toml(path), path)
+    suite = suite_from(read_toml(path), path)
+    if faults := _overlapping(suite, path):
+        raise InputError(faults)
+    return suite
 
 
 def suite_from(data: dict[str, Any], path: Path) -> Suite:
@@ -256,6 +260,43 @@ def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
         if other := [key for key in setting if first[key] != setting[key]]:
             allowed = f"{entry.name} has other {other[0]} under this variant above; choose another variant"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
+
+
+def _overlapping(suite: Suite, path: Path) -> list[Fault]:
+    """Entries that plan what one above plans, with another gate or time limit, of which a row has one.
+
+    Options of the command line may bring some together, as `--tolerance` does: then the first counts.
+    """
+    faults: dict[str, Fault] = {}
+    for (first, above), (k, entry) in combinations(enumerate(suite.solver), 2):
+        for scene, words in _planned_twice(suite, above, entry):
+            n, _ = read_scene(scene).expected_size or (0, 0)
+            limits = [each.time_limit_s or suite.time_limit(n) for each in (above, entry)]
+            for key, (one, other) in {"gated": [above.gated, entry.gated], "time_limit_s": limits}.items():
+                if one != other:
+                    allowed = f"{one} in solver.{first}, which plans {words} too: leave it to one of them"
+                    place = f"solver.{k}.{key}"
+                    faults.setdefault(place, Fault(str(path), place, other, allowed))
+    return list(faults.values())
+
+
+def _planned_twice(suite: Suite, one: SolverEntry, other: SolverEntry) -> Iterator[tuple[str, str]]:
+    """Each scene with a measurement that two entries of other terms plan there. No form is the dual."""
+    if (one.name, one.label, one.batched) != (other.name, other.label, other.batched):
+        return
+    if (one.gated, one.time_limit_s) == (other.gated, other.time_limit_s):
+        return
+    tolerances = [each.tolerances or suite.tolerances for each in (one, other)]
+    numbers = [set(map("{:g}".format, each)) for each in tolerances if each != "auto"]
+    tolerance = min(set.intersection(*numbers), default="") if numbers else "auto"
+    form = min({*(one.forms or ["dual"])} & {*(other.forms or ["dual"])}, default="")
+    threads = min({*(one.threads or suite.threads)} & {*(other.threads or suite.threads)}, default=0)
+    for scene in suite.scenes if tolerance and form and threads else ():
+        name = Path(scene).stem if Path(scene).suffix in (".toml", ".npz") else scene
+        globs = [each.scenes or ["*"] for each in (one, other)]
+        if all(any(fnmatchcase(name, glob) or glob == scene for glob in each) for each in globs):
+            words = [name, one.name, form, *filter(None, [one.label]), f"tol={tolerance}"]
+            yield scene, " ".join([*words, f"threads={threads}"])
 
 
 def _of_rounds(suite: Suite, path: Path) -> Iterator[Fault]:

@@ -7,6 +7,7 @@ as its best on the first scene of the next smaller size; on the other scenes in 
 took at most a tenth of the time limit.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, sqrt
@@ -26,12 +27,23 @@ LITTLE = sqrt(10)  # times the limit: an error that half a decade may mend
 
 def unmeasured(plan: Sequence[Measurement], rows: Sequence[Row]) -> list[Measurement]:
     """The measurements of a plan that need a row and have none."""
-    done = {row["key"] for row in rows}
-    return [m for m in plan if m.key not in done and still_needed(m, rows) is not None]
+    done, of_solver = {row["key"] for row in rows}, by_solver(rows)
+    return [m for m in plan if m.key not in done and still_needed(m, of_solver[m.solver]) is not None]
+
+
+def by_solver(rows: Sequence[Row]) -> defaultdict[str, list[Row]]:
+    """The rows of each solver. Those of a measurement's solver are all that decides on it."""
+    found: defaultdict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        found[str(row.get("solver"))].append(row)
+    return found
 
 
 def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
-    """The measurement in m's place in the plan, at the next tolerance of a search; None if there is none."""
+    """The measurement in m's place in the plan, at the next tolerance of a search; None if there is none.
+
+    rows : those of m's solver, perhaps among others, which only take time.
+    """
     if m.guide is None and m.iteration_limit is None and not (m.searched or m.paced):
         return m
     if not in_a_good_form(m, rows):
@@ -54,9 +66,36 @@ def still_needed(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
     return m
 
 
+#: A scene, a form or None for any, a solver, its label and threads.
+Cell = tuple[str, str | None, str, str, int]
+
+
+def cell_of(m: Measurement) -> Cell:
+    return m.scene, m.form, m.solver, m.entry.label, m.threads
+
+
+def decided_by(m: Measurement) -> set[Cell]:
+    """The cells whose rows `still_needed` asks for: it cannot tell while one of them is being measured."""
+    cells = set[Cell]()
+    if m.searched or m.paced or m.iteration_limit is not None:
+        cells.add(cell_of(m))
+    if m.guide:
+        cells.add((m.guide[0], None, *cell_of(m)[2:]))
+    return cells
+
+
+def decides_on(m: Measurement) -> set[Cell]:
+    """The cells of m whose rows may decide on others: none of a repeat, or of a run that a trace stops."""
+    if m.repeat or m.iteration_limit is not None:
+        return set()
+    return {cell_of(m), (m.scene, None, *cell_of(m)[2:])}
+
+
 def in_a_good_form(m: Measurement, rows: Sequence[Row]) -> bool:
     """Whether m's form was good enough on the scene that guides m, or nothing is known of it there."""
-    scene, times, most_s = m.guide or ("", inf, inf)
+    if m.guide is None:
+        return True
+    scene, times, most_s = m.guide
     seconds: dict[str, float] = {}
     for row in rows:
         there = row["scene"] == scene and row.get("owner") == "library"
@@ -80,11 +119,12 @@ def next_tolerance(m: Measurement, rows: Sequence[Row]) -> float | None:
     """
     same = [row for row in rows if (row["solver"], row["form"]) == (m.solver, m.form) and not row["repeat"]]
     searched = [row for row in same if row["tolerance"] in HALF_DECADES]
-    tried = {HALF_DECADES.index(row["tolerance"]): row for row in _of_cell(m, searched)}
+    own = _of_cell(m, searched)  # perhaps several of a tolerance, as workers once made them
+    tried = {HALF_DECADES.index(row["tolerance"]): row for row in own}
     if not tried:
         decades = [row["tolerance"] for row in searched if row["tolerance"] in HALF_DECADES[::DECADE]]
         return float(decades[-1]) if decades else START
-    enough = 2 if len(tried) == len(searched) else 1
+    enough = 2 if len(own) == len(searched) else 1
     if len(tried) >= enough and all(row["status"] in EXCEEDED for row in tried.values()):
         return None
     within = [k for k, row in tried.items() if row["verdict"] == "within"]

@@ -199,7 +199,7 @@ FIELDS = kinds(MeasurementRow) | kinds(Judgement)
 #: is accepted.
 PROBLEM_FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("scene", "title", "scene_key", "reference_route", "refused", "printed_source"), "text"),
-    "machine": "text",  # of merged runs
+    "machine": "text",  # whose seconds these are; null in older rows, and in those of `refused`
     **dict.fromkeys(("n", "m", "active", "cond_K", "lambda_min", "lambda_max", "reference_s"), "number"),
     **dict.fromkeys(("reference_bound_mm", "printed_objective", "printed_digits"), "number"),
     **dict.fromkeys(("build_s", "stored_mib", "sparse"), "object"),

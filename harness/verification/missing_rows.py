@@ -5,7 +5,7 @@ from pathlib import Path
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_written
-from harness.planning.tolerance_search import next_tolerance, still_needed
+from harness.planning.tolerance_search import by_solver, next_tolerance, still_needed
 from harness.results.records import Row
 
 from .findings import Finding
@@ -23,8 +23,8 @@ def never_measured(judged: Collection[str], rows: Sequence[Row], directory: Path
         yield Finding(path.name, Judgement("cannot_be_judged"), LIMIT_MM, why)
         return
     plan = [m for m in expand(read_written(path)) if m.entry.gated and m.iteration_limit is None]
-    missing = [m for m in plan if m.key not in judged]
-    due = [m for m in missing if not (m.searched and m.repeat and next_tolerance(m, rows))]
-    needed = {m.key: m for place in due if (m := still_needed(place, rows))}
+    missing, of_solver = [m for m in plan if m.key not in judged], by_solver(rows)
+    due = [m for m in missing if not (m.searched and m.repeat and next_tolerance(m, of_solver[m.solver]))]
+    needed = {m.key: m for place in due if (m := still_needed(place, of_solver[place.solver]))}
     for key, m in needed.items():
         yield Finding(key, Judgement("no_answer"), m.suite.limit_mm, "never measured: the run did not end")

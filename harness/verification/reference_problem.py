@@ -193,10 +193,10 @@ def refuse_without_contacts(prepared: Prepared, where: object) -> None:
         raise InputError.one(where, "contacts", 0, allowed)
 
 
-def record(problem: ReferenceProblem, directory: Path) -> None:
+def record(problem: ReferenceProblem, directory: Path, machine: str) -> None:
     """Put the scene into DIRECTORY/problems.jsonl and its contacts into DIRECTORY/scenes/NAME.npz.
 
-    The facts of a reference in the sparse form are under `sparse`.
+    machine : whose seconds these are. The facts of a reference in the sparse form are under `sparse`.
     """
     scene, assembly, reference = problem.scene, problem.prepared.assembly, problem.reference
     facts = problem.prepared.facts
@@ -211,6 +211,7 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
         "scene": scene.name,
         "title": scene.title,
         "scene_key": scene.key,
+        "machine": machine,
         "n": assembly.junction_size,
         "m": assembly.m,
         "active": int(reference.active.sum()),
@@ -220,12 +221,13 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     if printed := scene.printed:
         row |= {"printed_objective": printed.value, "printed_digits": printed.digits}
         row["printed_source"] = printed.source
-    earlier = _recorded(directory).get(scene.name)
-    if earlier and earlier.get("scene_key") != scene.key:
-        earlier = None
+    same = [each for each in records.read(directory / PROBLEMS) if each["scene"] == scene.name]
+    recorded = {each.get("machine"): each for each in same if each.get("scene_key") == scene.key}
+    earlier = recorded.get(machine) or recorded.get(None)
     sparse = earlier.get("sparse", {}) if earlier else {}
     if problem.form == "sparse":
-        row = (earlier or row) | {"sparse": sparse | {"unknowns": assembly.n, **of_family}}
+        sparse |= {"unknowns": assembly.n, **of_family}
+        row = (earlier or row) | {"machine": machine, "sparse": sparse}
     elif sparse:
         row["sparse"] = sparse
     _put(row, directory)
@@ -251,11 +253,16 @@ def record_refusal(scene: Scene, directory: Path) -> None:
     _put({"scene": scene.name, "title": scene.title, "n": n, "m": m, "refused": message}, directory)
 
 
-def _recorded(directory: Path) -> dict[str, dict[str, Any]]:
-    return {row["scene"]: row for row in records.read(directory / PROBLEMS)}
-
-
 def _put(row: dict[str, Any], directory: Path) -> None:
-    others = _recorded(directory)
-    others.pop(row["scene"], None)
-    records.rewrite(directory / PROBLEMS, [*others.values(), row])
+    """Let a row take the place of that of its scene and machine, of one that names no machine, as in older
+    versions, and of those of another problem of that name.
+    """
+
+    def stands(other: dict[str, Any]) -> bool:
+        if other["scene"] != row["scene"]:
+            return True
+        of_others = other.get("machine") not in (row.get("machine"), None)
+        return of_others and other.get("scene_key") == row.get("scene_key")
+
+    others = [other for other in records.read(directory / PROBLEMS) if stands(other)]
+    records.rewrite(directory / PROBLEMS, [*others, row])

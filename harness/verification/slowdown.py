@@ -10,14 +10,16 @@ A measurement is slower if S > R and, beyond the noise of the repeats in both ru
     min t / max t'  >  F⁺,    F⁺ the median of max t / min t' over the same others.
 
 Three repeats on each side are needed: all new ones are slower by chance once in 20 times. If all solvers on a
-scene become slower alike, nothing is reported.
+scene become slower alike, nothing is reported. The two runs may be of two machines, but each of one alone.
 """
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import inf
 
-from harness.results.comparison import Side, measurement
+import pandas as pd
+
+from harness.results.comparison import Incomparable, Side, measurement
 from problems.errors import InputError
 from report.analysis.comparison import ENOUGH, compared
 from report.results.rows import frame
@@ -37,15 +39,27 @@ class Times:
 
 
 def slowdowns(old: Side, new: Side, limit: float) -> Times:
-    """The measurements that are slower, limit : R. Raises InputError if no time can be compared."""
+    """The measurements that are slower, limit : R. Raises InputError if no time can be compared; Incomparable
+    if a side has rows of several machines.
+    """
+    for side in (old, new):
+        if len(side.machines) > 1:
+            allowed = "one machine for all rows of a side: name the directory of one machine's run"
+            raise Incomparable.one(side.name, "machine", sorted(side.machines), allowed)
     frames = [frame([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)]
     table = compared(frames[0], frames[1], True, inf, limit)
     table = table[(table[["repeats_old", "repeats_new"]].min(axis=1) >= ENOUGH) & table["ratio"].notna()]
-    pairs = table.merge(table, on="scene_new", suffixes=("", "_other"))
-    pairs = pairs[pairs["solver_new"] != pairs["solver_new_other"]]
-    lines = pairs.groupby("measurement")[["ratio", "ratio_least", "ratio_other", "ratio_most_other"]].median()
-    if lines.empty:
+    beside: list[pd.DataFrame] = []
+    for _, of_scene in table.groupby("scene_new"):
+        for solver, own in of_scene.groupby("solver_new"):
+            others = of_scene[of_scene["solver_new"] != solver]
+            if len(others):
+                middle = others[["ratio", "ratio_most"]].median()
+                own = own.assign(ratio_other=middle["ratio"], ratio_most_other=middle["ratio_most"])
+                beside.append(own.set_index("measurement"))
+    if not beside:
         raise InputError.one("--max-slowdown", "factor", limit, f"{NEEDED}: --repeat {ENOUGH}")
+    lines = pd.concat(beside)
     S = lines["ratio"] / lines["ratio_other"]
     slower = S[(limit < S) & (lines["ratio_least"] > lines["ratio_most_other"])]
     return Times({*map(str, lines.index)}, {str(name): float(each) for name, each in slower.items()})

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.results.provenance import provenance
+from report.document.escape import plain
 from report.document.numbers import counted, listed
 from report.results.reader import Results
 
@@ -25,6 +26,12 @@ def warnings(results: Results) -> list[str]:
         doubts.append(
             f"The rows come from {machines.nunique()} machines: {_with_rows(machines)}. "
             "They are reported one after the other; no table, mean or figure mixes them."
+        )
+    keys = rows[rows["scene_key"] != ""].groupby("scene")["scene_key"].nunique()
+    if changed := [str(scene) for scene in keys.index[keys > 1]]:
+        doubts.append(
+            f"Rows of {listed(changed)} are of several problems of that name, as of a file that has changed: "
+            "their times cannot be compared."
         )
     doubts += _unfinished(results)
     for solver, versions in _several(rows[~asked_for(rows)], "solver_version").items():
@@ -109,7 +116,9 @@ def _unfinished(results: Results) -> list[str]:
         if solver.get("name") not in libraries
         for source in suite.get("scenes", [])
         if (scene := names.get(source, source)) not in refused
-        and any(fnmatchcase(scene, glob) or glob == source for glob in solver.get("scenes", ["*"]))
+        and any(
+            fnmatchcase(plain(scene), plain(glob)) or glob == source for glob in solver.get("scenes", ["*"])
+        )
         for form in solver.get("forms", [ANY])
     }
     whole = rows[rows["iteration_limit"].isna()]

@@ -63,15 +63,15 @@ SPARE = [
     for color in (GREY, BLUE, ORANGE, VERMILLION, SKY, GREEN, PURPLE, ROSE, INDIGO, BROWN)
     if (color, marker) not in FIXED.values()
 ]
-#: Marker size, tint (0: the full colour, 1: white) and filled part of the marker of a solver's first,
-#: second, … variant of a form.
-VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "right"]], ...] = (
-    (6.5, 0.0, "full"),
-    (6.5, 0.3, "bottom"),
-    (7.5, 0.0, "left"),
-    (5.5, 0.45, "top"),
-    (8.5, 0.3, "right"),
+#: Marker size and filled part of the marker of a solver's first, second, … variant of a form, over and over.
+VARIANTS: tuple[tuple[float, Literal["full", "bottom", "left", "top", "right"]], ...] = (
+    (6.5, "full"),
+    (6.5, "bottom"),
+    (7.5, "left"),
+    (5.5, "top"),
+    (8.5, "right"),
 )
+PALEST = 0.65  # the tint of the last variant (0: the full colour, as of the first; 1: white)
 #: By form its dashes, and the tint of the marker's face: filled, hollow, pale. An unknown form looks like the
 #: last.
 LOOKS: dict[str, tuple[Any, float]] = {
@@ -156,9 +156,10 @@ def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
     for (solver, form), lines in cells.groupby(["solver", "form"]):
         full, marker = pairs[str(solver)]
         dashes, face = LOOKS.get(str(form), LOOKS["sparse"])
-        for i, method in enumerate(sorted(lines["method"].unique())):
-            size, tint, filled = VARIANTS[i % len(VARIANTS)]
-            color = _tinted(full, tint)
+        methods = sorted(lines["method"].unique())
+        for i, method in enumerate(methods):
+            size, filled = VARIANTS[i % len(VARIANTS)]
+            color = _tinted(full, PALEST * i / max(len(methods) - 1, 1))
             styles[method] = {
                 "color": color,
                 "marker": marker,

@@ -11,9 +11,14 @@ function verdict(cell) {
   return cell.over != null && cell.displacement_error_mm <= cell.limit_mm ? "within" : "outside";
 }
 
-// The cells that the filters leave, judged at the limit of the slider. `slower`: seconds over the fastest.
+// The limit of the slider, mm: of two digits, and where it stands at its start that of the rows.
+function limitAsked() {
+  return at("limit") === START.get("limit") ? DATA.limit_mm : Number((10 ** -at("limit")).toPrecision(2));
+}
+
+// The cells that the filters leave, judged at that limit. `slower`: seconds over the fastest.
 function filtered() {
-  const limit = Number((10 ** -at("limit")).toPrecision(2)), metric = at("metric");
+  const limit = limitAsked(), metric = at("metric");
   for (const cell of CELLS) {
     cell.limit_mm = Math.max(limit, cell.least_mm ?? 0);
     cell.over = cell.displacement_error_mm == null ? null : cell.displacement_error_mm / cell.limit_mm;
@@ -44,7 +49,8 @@ function ranking(cells) {
     const best = Object.fromEntries(own.toSorted(better).reverse().map(cell => [cell.scene, cell]));
     const logs = Object.values(best).filter(cell => cell.slower).map(cell => Math.log(cell.slower));
     const slower = logs.length ? Math.exp(logs.reduce((sum, log) => sum + log) / logs.length) : null;
-    const within = logs.length, scenes = Object.keys(best).length;
+    const within = Object.values(best).filter(cell => cell.judged === "within").length;
+    const scenes = Object.keys(best).length;
     return {name, method: own[0].method, best, scenes, within, share: within / scenes, slower};
   });
   lines.sort((a, b) => b.share - a.share || b.within - a.within || compared(a.slower, b.slower));

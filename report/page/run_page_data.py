@@ -84,6 +84,7 @@ def run_data(results: Results) -> Data:
     """The rows of a results directory, with the views, lists and figures of their page."""
     cells, scenes, maps = _cells(results), _scenes(results), scene_maps(results)
     limits = cells["limit_asked_mm"].dropna().mode()
+    limit_mm = float(limits.iloc[0]) if len(limits) else LIMIT_MM
     ladders = [scene for scene in scenes if scene["ladder"]]
     method_of = dict(zip(cells["label"], cells["method"], strict=True))
     methods = list(dict.fromkeys(method_of[label] for label in (in_order(cells) if len(cells) else [])))
@@ -108,7 +109,8 @@ def run_data(results: Results) -> Data:
     return {
         "banner": _banner(results),
         "views": list(views.items()),
-        "limit": limit_slider(float(limits.iloc[0]) if len(limits) else LIMIT_MM),
+        "limit": limit_slider(limit_mm),
+        "limit_mm": limit_mm,
         "controls": [
             *ways_to_show(cells, len(ladders) == len(scenes), methods),
             *filters,

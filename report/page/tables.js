@@ -57,9 +57,11 @@ function oneSolver() {
     el("p", {id: "breaks"}, breaks.length ? `Breaks at ${breaks.join(", ")}.` : ""));
 }
 
-// All that is known of the row that the address names, and the command that measures it again.
+// All that is known of the row that the address names, of the chosen machine where there are several, and the
+// command that measures it again.
 function openRow() {
-  const cell = CELLS.find(({key}) => key && key === at("row"));
+  const own = ({machine}) => !at("machine") || machine === at("machine");
+  const cell = CELLS.find(each => each.key && each.key === at("row") && own(each));
   if (!cell) return dialog.close();
   const quoted = text => /^[\w./=+:-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
   const place = `${quoted(DATA.directory)} --key ${quoted(cell.key)}`;

@@ -25,6 +25,7 @@ from .rows import VERSION, frame
 
 MOST_SHOWN = 40  # scenes drawn at random: more have a section of their own alone
 FAR_AWAY = 1e15  # mm: no picture is so large
+SECONDS = ["build_s", "reference_s", "sparse"]  # of a scene, and what has some of them
 LOG = re.compile(r"logs/[\w.+-]+\.txt")
 
 
@@ -46,6 +47,7 @@ class Results:
     left_out: int = 0  # rows of equal measurements, and of tolerances tried in a search for one
     rounds: pd.DataFrame = field(default_factory=lambda: frame([]))
     outdated: pd.DataFrame = field(default_factory=lambda: frame([]))
+    one_of_several: bool = False  # whether other machines made the rest of the rows
 
     @property
     def title(self) -> str:
@@ -98,20 +100,29 @@ class Results:
     def by_machine(self) -> list["Results"]:
         """The results of each machine, so that no table or mean can mix two of them."""
         names = self.rows["machine"].unique()
-        if len(names) < 2:
+        made_by = self.problems["machine"].dropna() if "machine" in self.problems else pd.Series(dtype=object)
+        if len(names) == 0 or (len(names) == 1 and made_by.isin(names).all()):
             return [self]
-        of = self.problems["machine"] if "machine" in self.problems else pd.Series(None, self.problems.index)
 
         def part(name: str) -> "Results":
             rows, rounds, outdated = (
                 table[table["machine"] == name].reset_index(drop=True)
                 for table in (self.rows, self.rounds, self.outdated)
             )
-            problems = self.problems[of.isna() | (of == name)]
-            cells = cells_of(rows)
-            return replace(self, rows=rows, cells=cells, problems=problems, rounds=rounds, outdated=outdated)
+            cells, problems = cells_of(rows), self._problems_of(name)
+            own = replace(self, rows=rows, cells=cells, problems=problems, rounds=rounds, outdated=outdated)
+            return replace(own, one_of_several=len(names) > 1)
 
         return [part(name) for name in names]
+
+    def _problems_of(self, machine: str) -> pd.DataFrame:
+        """The scenes that a machine made; those of others, or of an unknown one, without their seconds."""
+        if "scene" not in self.problems:
+            return self.problems
+        scenes, made_by = self.problems["scene"], self.problems.reindex(columns=["machine"])["machine"]
+        own = made_by == machine
+        problems = self.problems[own | ~scenes.isin(scenes[own])]
+        return problems.assign(**{name: problems[name].where(own) for name in SECONDS if name in problems})
 
 
 def read(directory: Path) -> Results:
@@ -136,7 +147,7 @@ def read(directory: Path) -> Results:
     left_out, again = len(records) - len(rows), rows["round"] != ""
     rows, rounds = (rows[of].reset_index(drop=True) for of in (~again, again))
     read = rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out
-    return Results(directory, *read, rounds, frame(old, VERSION))
+    return Results(directory, *read, rounds, frame(old, [*VERSION, "scene_key"]))
 
 
 def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dict[str, Any]:

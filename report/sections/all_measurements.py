@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 from urllib.parse import urlencode
 
@@ -31,21 +32,22 @@ def section(results: Results) -> Section | None:
     if results.cells.empty:
         return None
     facts = {problem.get("scene"): problem for problem in records(results.problems)}
+    machine = plain(results.rows["machine"].iloc[0]) if results.one_of_several else ""
     blocks: list[Block] = []
     for n, of_size in results.cells.sort_values(["active", "scene"]).groupby("n"):
         blocks.append(Text(f"### n = {n:.0f}"))
         scenes = of_size.groupby("scene", sort=False)
-        blocks += [_table(str(scene), cells, facts.get(scene, {})) for scene, cells in scenes]
+        blocks += [_table(str(scene), cells, facts.get(scene, {}), machine) for scene, cells in scenes]
     return Section("Every solver on every scene", blocks)
 
 
-def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any]) -> Table:
-    """problem : the row of the scene in problems.jsonl, if there is one."""
+def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any], machine: str) -> Table:
+    """problem : the row of the scene in problems.jsonl, if there is one. machine : "" if there is one."""
     rank = cells["verdict"].map(VERDICTS.index) + (cells["status"] == "unsupported")
     ordered = cells.assign(rank=rank).sort_values(["rank", "total_s", "solver", "form"], kind="stable")
     columns = [
         word("solver (form)", "label"),
-        Column("verdict", _verdict, "left"),
+        Column("verdict", partial(_verdict, machine=machine), "left"),
         Column("status (log)", _status, "left"),
         number("error, mm", "displacement_error_mm", power),
         Column("iterations (inner)", _iterations),
@@ -62,9 +64,10 @@ def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any]) -> Table
     return Table(f"scene-{file_name(scene)}", title, ordered[["label", *FIGURES, "key"]], columns)
 
 
-def _verdict(row: Mapping[str, Any]) -> str:
-    mark = MARKS.get(row["verdict"], MISSING)
-    return f"[{mark}](index.html#{urlencode({'row': plain(row['key'])})})" if row["key"] else mark
+def _verdict(row: Mapping[str, Any], machine: str) -> str:
+    """A link to the row on the page; machine : where several have a row of one key."""
+    mark, named = MARKS.get(row["verdict"], MISSING), {"machine": machine} if machine else {}
+    return f"[{mark}](index.html#{urlencode({'row': plain(row['key'])} | named)})" if row["key"] else mark
 
 
 def _status(row: Mapping[str, Any]) -> str:

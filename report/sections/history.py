@@ -19,6 +19,7 @@ from report.results.rows import CELL, VERSION, cells_of
 
 MINUTE = 16  # characters of a time: states of a plug-in follow one another within a day
 POINT = ["solver", *VERSION]
+PROBLEM = ["scene", "scene_key"]  # the key, as a file may have changed under its name
 CAPTION = (
     "*Libraries over versions and dates*, on the scenes that all versions have: the best form's seconds per "
     "load case, and as multiples of the fastest textbook method measured beside it; medians of the answers "
@@ -30,6 +31,7 @@ def section(results: Results) -> Section | None:
     """For results with rows of an older version or adapter beside the present one's."""
     present = results.rows[results.rows["owner"] == "library"]
     older = results.outdated[results.outdated["solver"].isin(present["solver"])]
+    older = older.merge(present[PROBLEM].drop_duplicates())
     if older.empty or not (results.rounds["owner"] == "textbook").any():
         return None
     rows = pd.concat([older, present]).drop_duplicates([*CELL, *VERSION, "repeat", "case"], keep="last")
@@ -50,11 +52,11 @@ def _lines(cells: pd.DataFrame, rounds: pd.DataFrame) -> pd.DataFrame:
     cells = cells.join(least, on=["machine", "scene", "beside_round"])
     seconds = cells["load_case_s"].where(cells["verdict"] == "within")
     cells = cells.assign(seconds=seconds, times=seconds / cells["least"])
-    best = cells.groupby([*POINT, "scene"]).agg({"seconds": "min", "times": "min", "recorded_at": "max"})
+    best = cells.groupby([*POINT, *PROBLEM]).agg({"seconds": "min", "times": "min", "recorded_at": "max"})
     lines: list[dict[str, Any]] = []
     for _, of_solver in best.reset_index().groupby("solver"):
         versions = of_solver.groupby(POINT).ngroups
-        common = of_solver[of_solver.groupby("scene")["scene"].transform("size") == versions]
+        common = of_solver[of_solver.groupby(PROBLEM)["scene"].transform("size") == versions]
         for (solver, version, _), rows in common.groupby(POINT) if versions > 1 else ():
             line = {
                 "solver": solver,

@@ -29,12 +29,12 @@ def machine(results: Results) -> Section | None:
     rows = results.rows[results.rows["cholesky_s"].notna()]
     if rows.empty:
         return None
-    groups = rows.groupby(["n", "threads"])
-    lines = spreads(rows, ["n", "threads"], ["cholesky_s", "product_s"])
-    lines = lines.assign(m=groups["m"].first(), runs=groups.size())
+    at = ["n", "m", "threads"]
+    lines = spreads(rows, at, ["cholesky_s", "product_s"])
+    lines = lines.assign(runs=rows.groupby(at, dropna=False).size()).reset_index()
     lines["gflops"] = lines["m"] ** 3 / 3 / lines["cholesky_s"] / 1e9
     lines["gb_per_s"] = 8 * lines["m"] ** 2 / lines["product_s"] / 1e9
-    columns = [number(name, name, whole) for name in ("n", "m", "threads", "runs")]
+    columns = [number(name, name, whole) for name in (*at, "runs")]
     columns += [
         Column("Cholesky of Q, s", spread("cholesky_s")),
         number("10⁹ operations/s", "gflops"),
@@ -42,7 +42,7 @@ def machine(results: Results) -> Section | None:
         number("GB/s read", "gb_per_s"),
     ]
     caption = "*What the machine can do*, measured after each solve in its process: medians (range)."
-    table = Table("speed-yardsticks", caption, lines.reset_index(), columns)
+    table = Table("speed-yardsticks", caption, lines, columns)
     return Section("The machine's own speed", [table])
 
 

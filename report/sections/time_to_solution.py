@@ -131,7 +131,8 @@ def section(results: Results) -> Section | None:
     if lines.empty:
         return None
     order = in_order(lines)
-    table = lines.assign(place=lines["label"].map(order.index), made_s=lines[[*MADE]].sum(axis=1))
+    made_s = lines[[*MADE]].sum(axis=1, skipna=False)
+    table = lines.assign(place=lines["label"].map(order.index), made_s=made_s)
     table = table.sort_values(["n", "active", "scene", "total_1_s", "place"])
     kept = ["scene", "n", "m", "active", "label", "threads", "tolerance", "status", "verdict"]
     kept += [*STAGES, "made_s", *(f"total_{k}_s" for k in LOAD_CASES)]

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import pandas as pd
 import pytest
 from commands import harness
 from suite_runs import changed, moved, rows_of
@@ -13,7 +14,7 @@ from synthetic_results import row
 from typer.testing import Result
 
 from harness.results import records
-from harness.results.comparison import Side, measurement
+from harness.results.comparison import Incomparable, Side, measurement
 from harness.results.records import Row
 from harness.verification.findings import Baseline, Finding, read_baseline, write_junit
 from harness.verification.judge import Judgement
@@ -202,10 +203,33 @@ def test_times_are_compared_beside_other_solvers(
     assert measurement(first) in found.compared
 
 
+def test_no_pair_of_a_scenes_measurements_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The load cases of a series are measurements of one scene: their square filled the memory."""
+    monkeypatch.setattr(pd.DataFrame, "merge", None)
+    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
+    cases = [timed(first | {"case": k}, [1.0 + k, 1.1 + k, 1.2 + k], [2.0, 2.1, 2.2]) for k in range(3)]
+    old = [row for case in cases for row in case]
+    slower = [row | {"solve_s": row["solve_s"] * (3 if row["solver"] == "exact" else 1)} for row in old]
+    found = slowdowns(Side("old", old), Side("new", slower), 1.5)
+    assert set(found.slower.values()) == {pytest.approx(3.0)}
+    assert (len(found.slower), len(found.compared)) == (3, 6)
+
+
 def test_single_runs_tell_nothing_of_times() -> None:
     first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
     with pytest.raises(InputError, match="3 repeats of two solvers"):
         slowdowns(Side("old", timed(first, [1.0], [2.0])), Side("new", timed(first, [9.0], [2.0])), 1.5)
+
+
+@pytest.mark.parametrize("mixed", ["old", "new"])
+def test_no_median_is_of_two_machines(mixed: str) -> None:
+    """One of the three repeats is of another, on one of the sides."""
+    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
+    sides = {name: Side(name, timed(first, *BEFORE)) for name in ("old", "new")}
+    sides[mixed].rows[-1]["machine"] = "another"
+    with pytest.raises(Incomparable, match=rf"{mixed}: machine = .*another.*one machine") as raised:
+        slowdowns(**sides, limit=1.5)
+    assert "Made-up CPU" in str(raised.value)
 
 
 def test_a_slower_solver_does_not_pass(copy: Path, tmp_path: Path) -> None:

@@ -4,10 +4,11 @@ import json
 import re
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs
 
 import pytest
 from commands import harness
-from synthetic_results import row, write_rows
+from synthetic_results import results, row, write_rows
 
 from harness.results import records
 from report.analysis.time_to_solution import stage_seconds
@@ -55,13 +56,27 @@ def test_no_ratio_is_of_two_machines(both: tuple[Path, Path], tmp_path: Path) ->
     assert not any(723 * 0.99 < each < 723 * 1.01 or 0 < abs(each - 1 / 723) < 1e-5 for each in numbers)
     assert f"Summary: {FAST}" in text
     assert f"Summary: {SLOW}" in text
-    results = read(out)
-    for part in results.by_machine():
+    links = map(parse_qs, re.findall(r"\]\(index\.html#([^)]+)\)", text))
+    assert [link["machine"] for link in links if link["row"] == [SHARED["key"]]] == [[FAST], [SLOW]]
+    for part in read(out).by_machine():
         seconds = 2.0 if part.rows["machine"].iloc[0] == FAST else 1446.0
         assert set(part.cells["load_case_s"]) == {seconds}
         assert set(part.problems["machine"]) == set(part.rows["machine"])
         dense = stage_seconds(part)[lambda lines: lines["form"] == "dual"]
         assert set(dense["K_s"]) == {seconds}
+
+
+@pytest.mark.parametrize("made_by", [SLOW, None])
+def test_no_condensation_of_another_machine_is_added(tmp_path: Path, made_by: str | None) -> None:
+    """As where workers measure what is opened here, or where an older version did not say whose it is."""
+    rows = [row(LOW, form=form, machine=FAST, model_s=1.0) for form in ("dual", "sparse")]
+    rows += [each | {"machine": SLOW} for each in rows] if made_by is None else []
+    build = {step: 1446.0 for step in ("condensation", "cholesky", "Q")}
+    problem = {"scene": LOW, "title": "A scene", "machine": made_by, "build_s": build}
+    for part in results(tmp_path, rows, problem).by_machine():
+        assert part.problems["title"].tolist() == ["A scene"]
+        dense = stage_seconds(part)[lambda lines: lines["form"] == "dual"]
+        assert dense[["K_s", "total_1_s"]].isna().all(axis=None)
 
 
 def test_rounds_and_older_versions_stay_with_their_machine(tmp_path: Path) -> None:

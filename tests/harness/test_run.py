@@ -90,7 +90,8 @@ def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
         assert problem["cond_K"] == pytest.approx(eigenvalues[-1] / eigenvalues[0])
         assert problem["active"] == np.count_nonzero(arrays["gap_after"] < 1e-12) == rows[0]["active"]
         assert np.array_equal(arrays["gap_before"], source["g"])
-    assert json.loads((finished / "machine.json").read_text())["machine"] == rows[0]["machine"]
+    machine = json.loads((finished / "machine.json").read_text())["machine"]
+    assert machine == rows[0]["machine"] == problem["machine"]
 
 
 def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
@@ -132,6 +133,19 @@ def test_all_rows_are_set_aside_in_one_pass(copy: Path) -> None:
     solvers = {("exact", ""): Description(["dual"], "another version", "another code")}
     assert resumed(copy, [*map(Uncompared, rows)], plan, solvers, Console(quiet=True)) == rows_of(copy) == []
     assert len(records.read(copy / records.OUTDATED)) == len(rows)
+
+
+def test_no_row_of_a_scene_that_has_changed_stays(copy: Path) -> None:
+    """Whatever its solver and round, planned or not; those of the scene as it is, and of others, do."""
+    first = rows_of(copy)[0]
+    others = [first | {"key": f"tiny other {k}", "solver": "other"} for k in range(3)]
+    others[1] |= {"round": "2026-01-01T00:00:00+00:00", "solver": "newton"}
+    others[2] |= {"key": "changed other", "scene": "changed", "scene_key": "another"}
+    old = [row | {"scene_key": "older"} for row in others[:2]]
+    plan = expand(read_written(copy / "suite.toml"))
+    solvers = {("exact", ""): Description(["dual"], "1", "code")}
+    assert resumed(copy, [*others, *old], plan, solvers, Console(quiet=True)) == others == rows_of(copy)
+    assert [row["key"] for row in records.read(copy / records.OUTDATED)] == [row["key"] for row in old]
 
 
 @pytest.mark.parametrize("suite_is_read", [True, False])

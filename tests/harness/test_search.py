@@ -1,5 +1,7 @@
 """tolerances = "auto" and repeats = "auto": what is measured, and what the report makes of it."""
 
+from concurrent.futures import Executor, Future
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,11 +12,21 @@ from rich.console import Console
 from suite_runs import rows_of, said_by
 
 from harness.commands.run_comparison import compare
+from harness.measurement import suite_run
 from harness.measurement.suite_run import run
+from harness.measurement.task import Task
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import HALF_DECADES, Measurement, expand
 from harness.planning.suite import read_suite, suite_from
-from harness.planning.tolerance_search import START, next_tolerance, still_needed
+from harness.planning.tolerance_search import (
+    START,
+    decided_by,
+    decides_on,
+    in_a_good_form,
+    next_tolerance,
+    still_needed,
+    unmeasured,
+)
 from harness.results.records import MEASUREMENTS, Row, rewrite
 from harness.verification.gate import gate
 from problems.errors import InputError
@@ -155,6 +167,78 @@ def test_a_search_after_one_on_another_scene_starts_at_its_last_tolerance(tmp_pa
     assert next_tolerance(m, [*rows, half]) == 1e-5  # a search begins at a decade
 
 
+def test_a_tolerance_that_was_measured_twice_counts_once(tmp_path: Path) -> None:
+    """As its rows were made by several workers at once: a second one that exceeds a limit ends the search."""
+    m = expand(suite_of(tmp_path))[0]
+    late = row_of(replace(m, tolerance=1e-6), 1.0, "no_answer") | {"status": "time_limit"}
+    assert next_tolerance(m, [late] * 4) == 1e-5
+    assert next_tolerance(m, [late, late | {"tolerance": 1e-5}]) is None
+
+
+class AtOnce(Executor):
+    """Does what is submitted at once; what is submitted ahead of an outcome knows none of it."""
+
+    def submit(self, work: Any, *sent: Any, **named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(work(*sent, **named))
+        except RuntimeError as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture
+def workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two workers, of two tasks each."""
+    monkeypatch.setattr(suite_run, "workers", lambda *_: nullcontext((AtOnce(), 2)))
+
+
+@pytest.mark.usefixtures("workers")
+def test_workers_search_as_one_process_does(tmp_path: Path) -> None:
+    """What depends on a row that is being made waits for it; others go first."""
+    suite = suite_of(tmp_path, LOOSE, repeats=2)
+    other = suite.solver[0].model_copy(update={"name": "newton"})
+    suite = suite.model_copy(update={"solver": [*suite.solver, other]})
+    alone = measured(suite, tmp_path / "alone")
+    assert said_by(lambda console: run(suite, tmp_path / "out", console, "workers"))[0] == 0
+    rows = rows_of(tmp_path / "out")
+    assert sorted(row["key"] for row in rows) == sorted(row["key"] for row in alone)
+    assert [row["solver"] for row in rows[:2]] == ["rough", "newton"]
+    assert [row["solver"] for row in alone[:2]] == ["rough", "rough"]
+
+
+@pytest.mark.usefixtures("workers")
+def test_a_search_does_not_try_again_what_its_workers_did_not_survive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried = []
+
+    def lost(task: Task) -> None:
+        tried.append(task.batch[0].key)
+        raise RuntimeError("the worker ended")
+
+    monkeypatch.setattr(suite_run, "run_task_on_worker", lost)
+    suite = suite_of(tmp_path, repeats=2)
+    assert said_by(lambda console: run(suite, tmp_path / "out", console, "workers"))[0] == 1
+    (key,) = tried
+    assert f"tol={START:g}" in key
+
+
+def test_a_row_is_waited_for_where_it_decides(tmp_path: Path) -> None:
+    """Of a search its own in the form, of a form that may be left out those of the guide in any."""
+    searched = expand(suite_of(tmp_path, repeats=2))
+    first, again = searched[0], next(m for m in searched if m.repeat)
+    assert all(decided_by(m) & decides_on(first) for m in (first, again))
+    assert not decides_on(again)
+    assert not decided_by(first) & decides_on(replace(first, scene="another"))
+    assert not decided_by(first) & decides_on(replace(first, form="primal"))
+    assert decided_by(replace(first, guide=("another", 3.0, 1.0))) & decides_on(
+        replace(first, scene="another", form="primal")
+    )
+    (alone,) = expand(read_suite(str(tiny_joint.write_suite(tmp_path))))
+    assert not decided_by(alone)
+
+
 def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str, Any]:
     names = ("scene", "solver", "form", "variant", "tolerance", "repeat")
     steps = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "form_s")) | {"solve_s": seconds}
@@ -185,6 +269,13 @@ def test_rows_are_read_only_for_what_they_may_leave_out(tmp_path: Path) -> None:
     assert still_needed(m, Unread()) == m
     with pytest.raises(AssertionError):
         still_needed(expand(suite_of(tmp_path))[0], Unread())
+
+
+def test_what_is_missing_is_decided_by_the_rows_of_its_solver_alone(tmp_path: Path) -> None:
+    """The rows of all would be read for every measurement of a plan, whose forms may all be good."""
+    plan = expand(suite_of(tmp_path))
+    assert unmeasured(plan, [{"key": "of another", "solver": "another"}]) == plan
+    assert in_a_good_form(plan[0], Unread())
 
 
 def test_tolerances_of_the_command_line() -> None:

@@ -94,10 +94,31 @@ def test_both_roads_are_recorded_in_either_order(order: tuple[Form, ...], tmp_pa
     path = str(write_strip(tmp_path))
     (tmp_path / "scenes").mkdir()
     for form in order:
-        record(measurable(path, form=form), tmp_path)
+        record(measurable(path, form=form), tmp_path, "A CPU")
     (problem,) = records.read(tmp_path / "problems.jsonl")
     assert problem["sparse"]["unknowns"] == 216
     assert (problem["cond_K"] is not None) == ("dual" in order)
+
+
+def test_a_scene_has_a_row_of_each_machine(tmp_path: Path) -> None:
+    """One that names none, of an older version, gives way to that of the machine that goes on."""
+    path, file = str(write_strip(tmp_path)), tmp_path / "problems.jsonl"
+    (tmp_path / "scenes").mkdir()
+    dense, sparse = (measurable(path, form=form) for form in ("dual", "sparse"))
+    record(dense, tmp_path, "A CPU")
+    (first,) = records.read(file)
+    records.rewrite(file, [{name: value for name, value in first.items() if name != "machine"}])
+    record(sparse, tmp_path, "A CPU")
+    record(sparse, tmp_path, "B CPU")
+    record(dense, tmp_path, "A CPU")
+    b, a = records.read(file)
+    assert [(each["machine"], each["cond_K"] is None, "unknowns" in each["sparse"]) for each in (a, b)] == [
+        ("A CPU", False, True),
+        ("B CPU", True, True),
+    ]
+    records.rewrite(file, [a, b | {"scene_key": "of the scene as it was"}])
+    record(dense, tmp_path, "A CPU")
+    assert [each["machine"] for each in records.read(file)] == ["A CPU"]
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])

@@ -11,7 +11,15 @@ from commands import harness
 from harness.measurement.suite_run import batches
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand, of_key, with_key
-from harness.planning.suite import Suite, read_suite, suite_from, suite_names, to_toml, validated
+from harness.planning.suite import (
+    Suite,
+    read_suite,
+    read_written,
+    suite_from,
+    suite_names,
+    to_toml,
+    validated,
+)
 from problems.errors import InputError
 
 TWO = """
@@ -140,6 +148,45 @@ def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> N
     text = '[[solver]]\nname = "gi"\n[[solver]]\nname = "gi"\noptions = {a = 1}\n'
     with pytest.raises(InputError, match=r"solver\.1\.variant"):
         read_suite(str(tiny_joint.write_suite(tmp_path, text)))
+
+
+ENTRY = '[[solver]]\nname = "exact"\n'
+
+
+@pytest.mark.parametrize(
+    ("above", "entry", "fault"),
+    [
+        ("gated = false", "", r"1\.gated = True: False in solver\.0, .* tiny exact dual tol=1e-09 threads=1"),
+        ("", 'forms = ["primal", "dual"]\ntime_limit_s = 3', r"solver\.1\.time_limit_s = 3.*: 20.* in .*\.0"),
+        ('tolerances = "auto"\ngated = false', "tolerances = [1e-6]", r"solver\.1\.gated .* tol=1e-06"),
+        ("gated = false", 'scenes = ["t*"]\nthreads = [2, 1]', r"solver\.1\.gated .* threads=1"),
+        ("", "time_limit_s = 20", None),  # the suite's
+        ("repeats = 2", "gated = true", None),
+        ("gated = false", "tolerances = [1e-6]", None),
+        ("gated = false", 'forms = ["primal"]', None),
+        ("gated = false", "threads = [2]", None),
+        ("gated = false", 'scenes = ["4386/*"]', None),
+        ("gated = false", 'variant = "other"', None),
+    ],
+)
+def test_no_entry_decides_for_another_whether_a_row_is_gated_and_how_long_it_may_take(
+    tmp_path: Path, above: str, entry: str, fault: str | None
+) -> None:
+    path = str(tiny_joint.write_suite(tmp_path, f"{ENTRY}{above}\n{ENTRY}{entry}\n"))
+    if fault is None:
+        assert read_suite(path)
+        return
+    with pytest.raises(InputError, match=fault):
+        read_suite(path)
+
+
+def test_of_entries_that_an_option_brings_together_the_first_counts(tmp_path: Path) -> None:
+    text = f"{ENTRY}{ENTRY}gated = false\ntolerances = [1e-3]\n"
+    change = Overrides(forms=("dual",), tolerances=(1e-6,))
+    suite = overridden(read_suite(str(tiny_joint.write_suite(tmp_path, text))), change)
+    assert [m.entry.gated for m in expand(suite)] == [True]
+    (tmp_path / "written.toml").write_text(to_toml(suite))
+    assert expand(read_written(tmp_path / "written.toml"))
 
 
 def test_unknown_suite_names_the_known_ones() -> None:

@@ -1,10 +1,12 @@
 """The figures: colours told apart by all readers, the size of wrong answers, what stands beside what."""
 
+import json
 import math
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.colors import to_rgb
 from synthetic_results import results, row
@@ -12,6 +14,7 @@ from synthetic_results import results, row
 from problems.ladders import ladders
 from report.figures import style
 from report.figures.junction_maps import CLOSED, LARGER, MARK, RIM
+from report.page.run_page_data import _look
 from report.sections.ladders import COUNTED, ladder_map, with_outcomes
 from solvers.registry import owner_of, solver_names
 
@@ -56,6 +59,17 @@ def test_any_number_of_solvers_look_different_and_keep_their_looks() -> None:
     assert min(np.linalg.norm(np.subtract(*pair)) for pair in colours) > 0.2
     fixed = {name: pairs[name] for name in style.FIXED}
     assert fixed == style.FIXED
+
+
+@pytest.mark.parametrize("form", style.LOOKS)
+def test_any_number_of_variants_look_different_also_on_the_page(form: str) -> None:
+    """The page has neither the sizes nor the filled parts of markers."""
+    for count in (1, 2, 5, 12, 40):
+        methods = [f"piqp ({form}) {k:02d}" for k in range(count)]
+        styles = style.line_styles(pd.DataFrame({"solver": "piqp", "form": form, "method": methods}))
+        assert [*styles] == methods
+        assert len({json.dumps(_look(look)) for look in styles.values()}) == count
+        assert styles[methods[0]]["color"] == style.FIXED["piqp"][0].lower()
 
 
 def test_every_ladder_of_numbers_says_what_its_rungs_count() -> None:

@@ -82,6 +82,14 @@ def test_different_code_of_one_solver_is_said(tmp_path: Path) -> None:
     assert re.search(r"\| a +\| 1.0 +\| one and two +\|", text)
 
 
+def test_rows_of_two_problems_of_one_name_are_said(tmp_path: Path) -> None:
+    keys = {LOW: ("old", "new"), HIGH: ("same", "same"), "6112/0100": ("", "unlike those that do not say")}
+    pairs = [(scene, of, key) for scene, both in keys.items() for of, key in zip("ab", both, strict=True)]
+    rows = [row(scene, of, commit=HERE, scene_key=key) for scene, of, key in pairs]
+    (doubt,) = said(tmp_path, *rows)
+    assert doubt.startswith(f"Rows of {LOW} are of several problems of that name")
+
+
 @pytest.mark.usefixtures("without_pictures")
 def test_a_report_of_the_same_code_is_the_same_bytes(tmp_path: Path) -> None:
     directory = write_rows(tmp_path, [row(LOW, "a", commit=OTHER), row(HIGH, "a", commit=OTHER)])
@@ -106,6 +114,14 @@ def test_rows_that_the_suite_does_not_plan_finish_no_run(tmp_path: Path) -> None
     (doubt,) = unfinished(tmp_path / "other", suite, there, *others)
     assert "1 of 2 combinations" in doubt
     assert unfinished(tmp_path / "whole", suite, there, there | {"scene": HIGH}) == []
+
+
+def test_a_row_that_a_glob_of_the_suite_plans_is_missed(tmp_path: Path) -> None:
+    for k, globs in enumerate(('["4386/*"]', '["4386/[0-1]*"]', '["*", "6112/*"]')):
+        suite = f'[[solver]]\nname = "a"\nscenes = {globs}\n'
+        (doubt,) = unfinished(tmp_path / f"lacks {k}", suite, row(LOW, "a"))
+        assert "1 of 2 combinations" in doubt
+        assert unfinished(tmp_path / f"has {k}", suite, row(LOW, "a"), row(HIGH, "a")) == []
 
 
 def test_a_file_is_the_scene_that_its_rows_name(tmp_path: Path) -> None:

@@ -54,6 +54,19 @@ def test_exponents_of_known_powers() -> None:
     assert exponent(sizes, [1.0, 2.0, math.nan, 0.0, math.nan]) is None
 
 
+def test_the_machines_speed_is_that_of_each_number_of_contacts(tmp_path: Path) -> None:
+    """Of two scenes with as many unknowns; 2e9 operations and 3e9 bytes a second."""
+    sizes = {"one": 1000, "other": 2000}
+    rows = [
+        timed(LOW, "ipm", 1.0, cholesky_s=m**3 / 3 / 2e9, product_s=8 * m**2 / 3e9) | {"scene": name, "m": m}
+        for name, m in sizes.items()
+    ]
+    lines = shown(table(speed.machine(results(tmp_path, rows))))[1:]
+    assert [[*line[:4], line[5], line[7]] for line in lines] == [
+        ["4386", f"{m}", "2", "1", "2.00", "3.00"] for m in sizes.values()
+    ]
+
+
 # Methods for contact problems.
 
 

@@ -1,5 +1,6 @@
-"""The section on versions of a library side by side."""
+"""The sections on versions of a library, side by side and over time."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -7,9 +8,9 @@ import pytest
 from synthetic_results import no_answer, results, row, shown
 
 from report.analysis.checks import warnings
-from report.document.blocks import Section, Text
+from report.document.blocks import Section, Table, Text
 from report.results.reader import read
-from report.sections import versions
+from report.sections import history, versions
 
 LOW, HIGH = "4386/0052", "4386/1074"
 
@@ -74,3 +75,18 @@ def test_variants_tolerances_and_the_installed_version_are_told_apart(tmp_path: 
     _, table = told(tmp_path / "options", options).blocks
     assert [line[1:3] for line in shown(table)[1:]] == [[f"dual k = {k}", v] for k in (1, 2) for v in "12"]
     assert told(tmp_path / "one", [of("1.0"), of("1.0", HIGH), of("2.0", solver="osqp")]) is None
+
+
+def test_versions_over_time_are_compared_on_the_same_problem(tmp_path: Path) -> None:
+    """A scene that has changed since is another one, whatever its name."""
+    began = "2025-01-01T00:00:00+00:00"
+    textbook = [row(scene, "nnls", owner="textbook", round=began) for scene in (LOW, HIGH)]
+    new = [row(scene, "piqp", solver_version="2", beside_round=began, scene_key="k") for scene in (LOW, HIGH)]
+    results(tmp_path, [*textbook, *new])
+    old = [each | {"solver_version": "1", "solve_s": 9.0} for each in new]
+    old[0] |= {"scene_key": "as it was"}
+    (tmp_path / "measurements.outdated.jsonl").write_text("".join(json.dumps(each) + "\n" for each in old))
+    section = history.section(read(tmp_path))
+    assert section is not None
+    (lines,) = (shown(block)[1:] for block in section.blocks if isinstance(block, Table))
+    assert [line[1:2] + line[3:6] for line in lines] == [["1", "1", "1", "9.35"], ["2", "1", "1", "1.35"]]

@@ -159,6 +159,28 @@ def test_the_slider_judges_again(chromium: Any, made: tuple[pd.DataFrame, Path])
         assert all((rank is None) == (within == 0) for within, rank in lines)  # none without an answer
 
 
+def test_the_limit_of_the_rows_is_that_of_the_page_with_all_its_digits(chromium: Any, tmp_path: Path) -> None:
+    """1.24e-7 mm is 1.2e-7 in two digits, and 1.26e-7 mm 1.3e-7."""
+    for limit, error, verdict in ((1.24e-7, 1.22e-7, "within"), (1.26e-7, 1.28e-7, "outside")):
+        judged_at = {"limit_mm": limit, "limit_asked_mm": limit}
+        rows = [row(displacement_error_mm=error, verdict=verdict, **judged_at)]
+        opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))))
+        assert chromium.execute_script("return filtered().map(cell => cell.judged)") == [verdict]
+        before = chromium.execute_script("return at('limit')")
+        chosen(chromium, "limit", "12")
+        assert chromium.execute_script("return filtered().map(cell => cell.judged)") == ["cannot_be_judged"]
+        chosen(chromium, "limit", before)
+        assert chromium.execute_script("return filtered().map(cell => cell.judged)") == [verdict]
+
+
+def test_an_answer_without_seconds_is_within_the_limit_all_the_same(chromium: Any, tmp_path: Path) -> None:
+    rows = [row(setup_s=0.0, solve_s=0.0, form_s=0.0), row(solver="gi")]
+    rows.append(row(solver="gi", scene="4386/1074", verdict="outside", displacement_error_mm=1e-6))
+    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))))
+    script = "return ranking(filtered()).map(line => [line.name, line.within, line.scenes, line.rank])"
+    assert chromium.execute_script(script) == [["ipm (dual)", 1, 1, 1], ["gi (dual)", 1, 2, 2]]
+
+
 def test_a_column_sorts_up_and_down(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
     """Cells that are not within the limit stay last, either way up."""
     cells, page = made
@@ -268,6 +290,21 @@ def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:
     assert eventually(chromium, "!location.hash.includes('row=')")
     chromium.execute_script(f"{SEEN}.find(td => td.dataset.key === arguments[0]).click()", keys[0])
     assert parse_qs(chromium.execute_script("return location.hash.slice(1)"))["row"] == [keys[0]]
+
+
+def test_a_row_is_of_the_machine_that_is_named_or_chosen(chromium: Any, tmp_path: Path) -> None:
+    names, key = ("One CPU", "Other CPU"), "4386/0052 ipm"
+    rows = [row(key=key, machine=name, solve_s=1.0 + k) for k, name in enumerate(names)]
+    page = write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows)))
+    shown = "return dialog.open ? [...dialog.querySelectorAll('td')].map(td => td.textContent) : []"
+    for name, other in (names, names[::-1]):
+        opened(chromium, page, urlencode({"row": key, "machine": name}))
+        found = chromium.execute_script(shown)
+        assert (name in found, other in found) == (True, False)
+        opened(chromium, page)
+        chosen(chromium, "machine", name)
+        chromium.execute_script(f"{SEEN}[0].click()")
+        assert name in chromium.execute_script(shown)
 
 
 def test_a_ladder_says_where_a_solver_breaks(chromium: Any, tmp_path: Path) -> None:
