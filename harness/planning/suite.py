@@ -271,8 +271,9 @@ def _overlapping(suite: Suite, path: Path) -> list[Fault]:
     for (first, above), (k, entry) in combinations(enumerate(suite.solver), 2):
         for scene, words in _planned_twice(suite, above, entry):
             n, _ = read_scene(scene).expected_size or (0, 0)
-            limits = [each.time_limit_s or suite.time_limit(n) for each in (above, entry)]
-            for key, (one, other) in {"gated": [above.gated, entry.gated], "time_limit_s": limits}.items():
+            one_s, other_s = (each.time_limit_s or suite.time_limit(n) for each in (above, entry))
+            terms = ("gated", above.gated, entry.gated), ("time_limit_s", one_s, other_s)
+            for key, one, other in terms:
                 if one != other:
                     allowed = f"{one} in solver.{first}, which plans {words} too: leave it to one of them"
                     place = f"solver.{k}.{key}"

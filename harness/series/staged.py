@@ -178,7 +178,7 @@ class StagedSession:
         """The result of the last stage, with the largest gap of each, and the verdict of the first that is
         not within.
 
-        unproven : whether fasteners have locked what is not proven to 1e-7 mm, so that no later error is known.
+        unproven : whether fasteners have locked what is not proven to 1e-7 mm: no later error is known.
         """
         row, gap = stages[-1][1]
         gaps = {"stages_max_gap_mm": {name: result.row.get("max_gap_mm") for name, result in stages}}

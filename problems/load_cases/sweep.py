@@ -20,7 +20,7 @@ from problems.model.interface import AnyJoint
 from problems.model.joint import Faults
 from problems.model.positions import Positions
 from problems.model.scene import JointScene, Scene
-from problems.model.stages import Plan
+from problems.model.stages import StagePlan
 from problems.storage import digest
 
 from . import LoadCases
@@ -124,7 +124,7 @@ def faults_of(scene: JointScene, changes: Sequence[tuple[Key, Any]], where: str)
         for key, value, allowed in effects[number].faults(scene.joint)
     ]
     if not wrong and any(key.moves for key, _ in changes):
-        plan = Plan(effects, scene.stages, scene.joint)
+        plan = StagePlan(effects, scene.stages, scene.joint)
         wrong = list(plan.faults() if scene.stages else misplaced(effects, scene.joint))
     return [Fault(where, *fault) for fault in wrong]
 
