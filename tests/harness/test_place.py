@@ -654,8 +654,8 @@ def test_a_scene_that_was_read_needs_its_file(
     def search(*_: object) -> None:
         raise ReachedError
 
-    for module in ("placement", "shimming"):
-        monkeypatch.setattr(f"harness.{module}.run.search_in_rounds", search)
+    for module in ("placement.run", "shimming.shim_run"):
+        monkeypatch.setattr(f"harness.{module}.search_in_rounds", search)
     read, table = read_scene(str(strip)), tomllib.loads(strip.read_text())
     gap, *rest = read.effects  # type: ignore[attr-defined]
     changed = replace(read, effects=(gap.model_copy(update={"mean": 0.06}), *rest))  # type: ignore[call-arg]

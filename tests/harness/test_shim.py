@@ -220,7 +220,7 @@ def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path,
 def test_a_scene_whose_effects_are_inline_tables_is_shimmed(tmp_path: Path) -> None:
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(INLINE + two_parts())
-    asked = ("--allow-gap", 0.1, "--stock", "0.1,0.2", "--patches", "2x1")
+    asked = ("--allow-gap", 0.05, "--stock", "0.1,0.2", "--patches", "2x1")
     done = harness("shim", scene, *asked, "--out", out)
     assert done.exit_code in (0, 4), done.output
     kinds = [effect.kind for effect in read_scene(str(out / "shimmed.toml")).effects]  # type: ignore[attr-defined]

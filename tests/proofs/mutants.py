@@ -285,9 +285,10 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "search.among(self.cases, 0)": ("search.among((0,), 0)",),
     },
     "problems/effects/shims.py": {
-        "(cross(edge, at[:, None] - corners) > 0) == (edge[:, 1] > 0)": (
-            "cross(edge, at[:, None] - corners) > 0",
+        "(cross(edge, at[some, None] - corners) > 0) == (edge[:, 1] > 0)": (
+            "cross(edge, at[some, None] - corners) > 0",
         ),
+        "low - NUDGE <= places": ("low <= places",),
         "low + NUDGE, high - NUDGE": ("low - 1.0, high + 1.0",),
         "places - NUDGE": ("places",),
         "np.roll(above, -1, axis=1)": ("np.roll(above, 1, axis=1)",),
@@ -315,7 +316,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "problems/load_cases/random_inputs.py": {
         "self.levels - 1) + 0.5)": ("self.levels - 1) + 0.4)",),
-        "if one.changes_K:\n                effects": ("if False:\n                effects",),
+        "for one, v in drawn if one.changes_K]": ("for one, v in drawn if False]",),
         'float(one.path == ("preload",))': ("0.0", "1.0"),
         "[elements if self.elements else [0]]": ("[: len(elements) or 1]",),
         "if i not in self.pieces": ("if True",),

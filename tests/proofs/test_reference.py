@@ -15,7 +15,7 @@ from harness.conformance.known_problems import contact_rows
 from harness.measurement.task import why_not_judged
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from harness.solving import session
+from harness.solving import solver_session as session
 from harness.verification import reference as module
 from harness.verification.judge import Judgement
 from harness.verification.proof import Proof
