@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from harness.verification import proof as proofs
 from harness.verification.reference import proof_of
+from harness.verification.sprung_contacts import SprungContacts, SprungFactors
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.compliance import ApproximateInverse
 from problems.forms.prepared import Prepared
@@ -64,6 +65,20 @@ def test_forces_are_refined_to_rounding_in_few_steps(
     for found in proof_of(data).proven([load] * 2, list(lam * off)):
         assert abs(found.x.hi - x).max() <= found.bound_mm <= 1e-11
         np.testing.assert_allclose(found.lam.hi, lam, atol=1e-8 * lam.max())
+
+
+def test_the_first_step_takes_the_forces_of_open_contacts_away() -> None:
+    """dλ_N = −λ_N, and from it y_C + (Q dλ)_C = −dλ_C/ρ, with K = I."""
+    random = np.random.default_rng(3)
+    A = sp.csc_array(random.standard_normal((9, 5)))
+    units = proof_of(Prepared(Assembly(Stiffness.of(sp.csc_array(sp.eye_array(9))), A))).balanced
+    springs, Q = SprungFactors(units, 2.0**-30), units.A.T @ units.A
+    y, lam = np.array([0.1, 0.2, 0.15, 40.0, 50.0]), random.uniform(1.0, 2.0, 5)
+    first = SprungContacts(springs, y, lam, np.ones(5))
+    assert (~first.C).any()
+    np.testing.assert_array_equal(first.dlam[~first.C], -lam[~first.C])
+    left = (y + Q @ first.dlam + first.dlam / springs.rho)[first.C]
+    np.testing.assert_allclose(left, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("n", [14, 20])
