@@ -258,7 +258,7 @@ class PlanSession:
         """An estimate of the largest gap in any of some cases without items, (m,) mm."""
         blocks = (numbers[k : k + self.block] for k in range(0, len(numbers), self.block))
         gaps = (self.answers([()], block, ESTIMATE_MM)[-1].vectors[1] for block in blocks)
-        return np.max([gap.max(axis=1) for gap in gaps], axis=0)
+        return np.array([gap.max(axis=1) for gap in gaps]).max(axis=0)
 
     def _outcomes(
         self, plans: Sequence[Plan], numbers: tuple[int, ...], starts: list[StageAnswers]

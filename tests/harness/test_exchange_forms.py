@@ -331,7 +331,8 @@ def test_an_mps_file_has_the_program_and_its_optimum(
         assert np.allclose(h, problem.h(load), rtol=1e-14, atol=0)
     highs = highspy.Highs()
     highs.silent()
-    assert highs.readModel(str(out.rename(out.with_suffix(".mps")))) == highspy.HighsStatus.kOk
+    read = highs.readModel(str(out.rename(out.with_suffix(".mps"))))
+    assert read in (highspy.HighsStatus.kOk, highspy.HighsStatus.kWarning)  # 1.16 leaves out |P_ij| <= 1e-9
     for option in ("qp_regularization_value", "primal_feasibility_tolerance", "dual_feasibility_tolerance"):
         highs.setOptionValue(option, 0.0 if option[0] == "q" else 1e-10)
     highs.run()

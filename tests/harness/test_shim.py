@@ -120,6 +120,7 @@ def test_a_force_counts_as_a_gap_with_the_same_share_of_its_limit(strip: Path) -
     (outcome,) = search.outcomes([()], [0], 50)
     assert outcome.largest[0] == max(*outcome.further[0][:5], outcome.further[0][-2] / 100.0)
     assert outcome.further[0][-2] >= 40.0  # a fastener's preload
+    assert search._enough(0.04, 1e-13) == [0.08]  # a gap that is too large by rounding alone needs more, too
 
 
 def test_each_contact_is_in_one_patch(tmp_path: Path) -> None:

@@ -175,7 +175,7 @@ BAD = [
     ("fasteners.preload=normal(1e999, 1)", "all finite"),
     ("fasteners.preload=normal(mean, 1)", "[each] NAME(PARAMETERS)"),
     ("fasteners.preload=expon(loc=60, scale=1, scale=2)", "[each] NAME(PARAMETERS)"),
-    ("fasteners.preload=norminvgauss(1, 0.5, 60, 1)", "norminvgauss(a, b, loc=0, scale=1)"),
+    ("fasteners.preload=norminvgauss(1, 2, 60, 1)", "norminvgauss(a, b, loc=0, scale=1)"),
     ("fasteners.preload=0 of normal(60, 5)", "[each] NAME(PARAMETERS)"),
     (f"fasteners.preload={'9' * 5000} of normal(60, 5)", "[each] NAME(PARAMETERS)"),
     ("fasteners.points.x=normal(0, 20)", "on the junction"),
