@@ -437,7 +437,11 @@ TESTS = {
     "harness/shimming/study.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
     "harness/shimming/gap_regions.py": ("harness/test_shim.py",),
     "harness/shimming/joint_shims.py": ("harness/test_shim.py",),
-    "problems/effects/shims.py": ("harness/test_shim.py", "harness/test_shim_stages.py"),
+    "problems/effects/shims.py": (
+        "problems/test_effects.py",
+        "harness/test_shim.py",
+        "harness/test_shim_stages.py",
+    ),
     "harness/placement/search.py": ("harness/test_search.py", "harness/test_place.py"),
     "harness/placement/fresh_cases.py": ("harness/test_place.py",),
     "harness/series/derivatives.py": ("harness/test_derivatives.py",),
