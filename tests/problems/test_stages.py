@@ -8,7 +8,8 @@ from typing import Self
 import numpy as np
 import pytest
 from riveted_strips import FORCE, STIFFNESS, C, Tables, approach, joint_scene, strips
-from small_joints import untied
+from small_joints import JOINT as PLATES
+from small_joints import make_scene, untied
 from superelements import stiffnesses, write_part
 
 from harness.scene.solution import solve
@@ -397,3 +398,12 @@ def test_supports_that_are_shifted_in_a_stage() -> None:
     assert abs(load_case(first).f).max() == 0.0
     assert abs(load_case(last).f).max() > 1.0
     np.testing.assert_array_equal(load_case(last).f, load_case(joined([], held)).f)
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+def test_matrices_with_springs_have_keys_of_their_own(form: Form) -> None:
+    """The key names proven bounds in the cache, and the springs are in K."""
+    points = ((150.0, 60.0),)
+    springs = [InstalledFasteners(kind="installed_fasteners", points=points, stiffness=k) for k in (1e3, 1e4)]
+    scenes = make_scene(PLATES), *(make_scene(PLATES, spring) for spring in springs)
+    assert len({prepared(scene, form=form).key for scene in scenes}) == 3
