@@ -1,15 +1,18 @@
 """What all tests share: a cache of their own, so that none reads or fills the user's; pictures of few pixels,
-drawn in a quarter of the time; garbage that is looked for less often; quick tests first."""
+drawn in a quarter of the time; a command line that is built once; garbage that is looked for less often; quick
+tests first."""
 
 import gc
 import os
 import shutil
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 from forked_processes import fork_measuring_processes
+from typer.main import get_command
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 SHARED = ("chromium", "cluster")  # fixtures that take long to make
@@ -28,6 +31,7 @@ def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
+        patch.setattr("typer.testing._get_command", cache(get_command))
         yield
 
 
