@@ -33,7 +33,7 @@ from rivetbench import run_series
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
 COMMAND = ("series", "strip.toml", "--threads", "1")
-SLOW = tiny_joint.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
+SLOW = tiny_joint.EXACT.replace("L = sla", "__import__('time').sleep(0.05); L = sla")
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -61,11 +61,9 @@ def gaps_of(directory: str) -> np.ndarray:
     return series_file.StoredGaps(Path(directory), 45)[[row["case"] for row in rows_of(directory)]]
 
 
-def test_rows_and_gaps_against_nnls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each case solved again as the scene that its row names, by another method; with the report."""
-    monkeypatch.undo()
+def test_rows_and_gaps_against_nnls(tmp_path: Path) -> None:
+    """Each case solved again as the scene that its row names, by another method."""
     series("--cases", "70", "--seed", "5", "--check", "10", "--out", "plain")
-    assert Path("plain/report/report.md").is_file()
     rows, gaps = rows_of("plain"), gaps_of("plain")
     assert [row["case"] for row in rows] == list(range(70))
     assert {row["verdict"] for row in rows} == {"within"}
@@ -202,18 +200,18 @@ def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_a_kill_loses_and_doubles_no_row() -> None:
-    slow = ("--cases", "80", "--solver", "slow", "--plugin", "slow.py", "--out", "killed")
+    slow = ("--cases", "25", "--solver", "slow", "--plugin", "slow.py", "--out", "killed")
     going = forked_command(*COMMAND, *slow)
     wait_for(lambda: series_rows(Path("killed")))
     assert going.poll() is None
     going.send(signal.SIGKILL)
     going.ended()
     kept = rows_of("killed")
-    assert 0 < len(kept) < 80
+    assert 0 < len(kept) < 25
     series(*slow)
     rows = rows_of("killed")
     assert rows[: len(kept)] == kept
-    assert sorted(row["case"] for row in rows) == list(range(80))
+    assert sorted(row["case"] for row in rows) == list(range(25))
 
 
 def test_a_table_may_grow_and_not_change() -> None:

@@ -110,6 +110,7 @@ def test_a_stage_that_locks_what_is_not_proven_proves_no_plan(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("blank_pictures")
 def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
     """Of the command, whose plan.toml has the stages, and whose series goes through them."""
     out = tmp_path / "out"

@@ -29,6 +29,7 @@ def scene(tmp_path: Path) -> Path:
     return tmp_path / "scene.toml"
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.parametrize(("form", "solver"), [("dual", "newton"), ("sparse", "newton"), ("primal", "piqp")])
 def test_each_case_goes_through_all_stages(scene: Path, tmp_path: Path, form: Form, solver: str) -> None:
     command = "series", scene, "--cases", COUNT, "--form", form, "--solver", solver, "--out", tmp_path / "s"

@@ -51,6 +51,7 @@ def answered(path: Path, out: Path, solver: str | None = None) -> dict[str, Any]
         return json.loads((out / "solution.json").read_text()) | dict(arrays)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_part_alone_is_a_linear_solve(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
     monkeypatch.setattr(
@@ -106,6 +107,7 @@ def test_displacements_that_overflow_are_refused(A: np.ndarray) -> None:
         solve(scene)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.parametrize("form", ["npz", "mtx"])
 def test_there_and_back(form: str, path: Path) -> None:
     """And the matrices, solved by themselves, give the same displacements."""
