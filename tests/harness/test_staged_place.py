@@ -1,6 +1,7 @@
 """Plans of fasteners that stages set and take out: the gap after the last stage, against `solve`."""
 
 import json
+import pickle
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -12,21 +13,15 @@ from commands import harness
 from small_joints import STAGED
 
 from harness import solve
-from harness.measurement.scheduler import workers
-from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, without_fasteners
-from harness.placement.plan_search import Step
-from harness.placement.search import Search
-from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question
+from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question, answer
 from harness.results import series_file
 from harness.scene.scene_file import MOVED, edited, with_fasteners
-from harness.terminal.console import console_of
 from problems.errors import InputError
 from problems.forms import Form
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene
 from problems.model.stage_answers import stage_scenes
-from problems.reporter import SILENT
 from problems.scene_files import read_scene
 
 CASES = 2
@@ -139,21 +134,13 @@ def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
     assert "after stage release" in (out / "report" / "report.md").read_text()
 
 
-@pytest.mark.slow
-def test_workers_find_the_same(path: Path, tmp_path: Path, cluster: Any) -> None:
+def test_a_worker_answers_the_same(path: Path) -> None:
+    """It is sent the study with the cases of the question alone, and opens the stages anew."""
     movable = MovableFasteners.of(read_scene(str(path)))
-    bare, holes = movable.bare, plan_of(grid(movable.bare, 2, 2))
-    study = FastenerStudy(bare, random_gaps(bare, CASES, 0), "dual", movable)
-    nodes = PlanSession(study).last.data.assembly.contact_nodes
-    assert nodes is not None
-
-    def searched(name: str, pool: Any = None) -> list[Step]:
-        journal = AnswerJournal(study, tmp_path / name, {"plans": "of tacks"}, pool)
-        return Search(journal, CASES, 0, 0.0, bare, nodes, holes).once(movable.current, 2)[0]
-
-    whole = searched("whole")
-    with workers(cluster.scheduler_address, console_of(SILENT)) as pool:
-        assert searched("workers", pool) == whole
+    study = FastenerStudy(movable.bare, random_gaps(movable.bare, CASES, 0), "dual", movable)
+    question = Question((movable.current, ()), (1,))
+    task = replace(study, cases=study.cases.only(question.cases)), question
+    assert answer(pickle.loads(pickle.dumps(task))) == PlanSession(study).answer(question)
 
 
 def test_a_plan_without_fasteners_has_stages_without_them(path: Path, tmp_path: Path) -> None:
