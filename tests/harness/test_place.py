@@ -633,15 +633,6 @@ def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
         MovableFasteners.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
 
 
-def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) -> None:
-    """A series in DIR/plan, which the end of the search would meet."""
-    (tmp_path / "plan").mkdir()
-    done = place(strip, tmp_path, "--count", 2)
-    assert done.exit_code == 2
-    assert "has plan of another command: name another directory" in done.output
-    assert not (tmp_path / PLANS).exists()
-
-
 class ReachedError(Exception):
     """A search begins."""
 

@@ -99,10 +99,9 @@ def test_a_series_says_so_too(name: str) -> None:
         list(solve_series(scene, [LoadCase(np.ones(1), np.zeros(0))], name))
 
 
-@pytest.mark.parametrize("A", [np.zeros((1, 0)), np.ones((1, 1))], ids=["without", "with contact"])
 @pytest.mark.filterwarnings("ignore:overflow encountered")
-def test_displacements_that_overflow_are_refused(A: np.ndarray) -> None:
-    scene = own_matrices([[1e-10]], A, [1e300], np.zeros(A.shape[1]))
+def test_displacements_that_overflow_are_refused() -> None:
+    scene = own_matrices([[1e-10]], np.zeros((1, 0)), [1e300], [])
     with pytest.raises(InputError, match=r"largest \|f\| = 1e\+300: loads with finite displacements"):
         solve(scene)
 
