@@ -323,15 +323,14 @@ def test_a_browser_in_the_terminal_gets_the_page(path: Path, monkeypatch: pytest
 
 
 def test_the_outcome_in_words(path: Path) -> None:
-    page = pytest.importorskip("harness.explore.page")
     explorer, settings = Explorer(scene_at(path), "dual"), Settings.of(scene_at(path))
     answer = explorer.answer(settings)
     places, largest = explorer.data.assembly.contact_nodes, float(answer.gap.max())
-    assert ">FAIL<" in page.outcome(answer, places, largest / 2)
-    assert ">PASS<" in page.outcome(answer, places, largest * 2)
+    assert ">FAIL<" in explore_page.outcome(answer, places, largest / 2)
+    assert ">PASS<" in explore_page.outcome(answer, places, largest * 2)
     proven = explorer.proven(answer)
-    assert "proven" in page.outcome(proven, places, largest * 2)
-    assert ">cannot be told<" in page.outcome(replace(proven, error_mm=largest), places, largest * 1.1)
+    assert "proven" in explore_page.outcome(proven, places, largest * 2)
+    assert ">cannot be told<" in explore_page.outcome(replace(proven, error_mm=largest), places, largest * 1.1)
 
 
 def test_the_raster_shows_every_contact_where_it_is() -> None:

@@ -204,7 +204,7 @@ def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
 def test_ctrl_c_in_a_terminal_ends_workers_without_a_word_of_theirs(tmp_path: Path) -> None:
     """The signal goes to the whole group of processes, and every one of them ends."""
     out = tmp_path / "out"
-    command = ["series", write_strip(tmp_path), "--cases", 100_000, "--scheduler", "local:1", "--out", out]
+    command = ["series", write_strip(tmp_path), "--cases", 10_000, "--scheduler", "local:1", "--out", out]
     going = subprocess.Popen(
         [sys.executable, "-m", "harness", *map(str, command)],
         cwd=ROOT,

@@ -15,6 +15,7 @@ from harness.series.load_case_source import GapCases
 from harness.series.session import Job
 from harness.series.staged import StagedSession
 from harness.verification.judge import LIMIT_MM
+from problems.build import load_case
 from problems.forms import Form
 from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
@@ -34,7 +35,7 @@ def test_each_case_goes_through_all_stages(scene: Path, tmp_path: Path, form: Fo
     command = "series", scene, "--cases", COUNT, "--form", form, "--solver", solver, "--out", tmp_path / "s"
     assert harness(*command, "--limit", 1e-6, "--tolerance", 1e-10).exit_code == 0
     read = scene_at(scene)
-    shims = solve(replace(read, stages=())).problem.load.g - solve(without_shims(read)).problem.load.g
+    shims = load_case(replace(read, stages=())).g - load_case(without_shims(read)).g
     cases = GapCases(count=COUNT).of(last_scene(read), form)
     rows = sorted(series_file.rows(tmp_path / "s"), key=lambda row: row["case"])
     assert len(rows) == COUNT
