@@ -1,6 +1,6 @@
 """What all tests share: a cache of their own, so that none reads or fills the user's; pictures of few pixels,
-drawn in a quarter of the time; a command line that is built once; garbage that is looked for less often; quick
-tests first."""
+drawn in a quarter of the time; a command line that is built, and an origin of rows that is asked for, once;
+garbage that is looked for less often; quick tests first."""
 
 import gc
 import os
@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 from forked_processes import fork_measuring_processes
 from typer.main import get_command
+
+from harness.results import provenance
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 SHARED = ("chromium", "cluster")  # fixtures that take long to make
@@ -32,7 +34,17 @@ def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
         patch.setattr("typer.testing._get_command", cache(get_command))
+        _asked_once(patch)
         yield
+
+
+def _asked_once(patch: pytest.MonkeyPatch) -> None:
+    """What each series, answer and report records: git tells it in four processes. Other trees may change."""
+    git, here = provenance._git, provenance.ROOT
+    once = cache(git)
+    patch.setattr(provenance, "_git", lambda *words: (once if here == provenance.ROOT else git)(*words))
+    for name in ("_blas", "installed_version"):
+        patch.setattr(provenance, name, cache(getattr(provenance, name)))
 
 
 @pytest.fixture(autouse=True)
