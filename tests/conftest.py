@@ -3,27 +3,23 @@ drawn in a quarter of the time; a command line that is built, and an origin of r
 garbage that is looked for less often; quick tests first."""
 
 import gc
-import os
 import shutil
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import one_thread
 import pytest
 from forked_processes import fork_measuring_processes
 from typer.main import get_command
 
 from harness.results import provenance
 
-DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 SHARED = ("chromium", "cluster")  # fixtures that take long to make
 ON_WORKERS = ("harness.measurement.task", "harness.placement.session", "harness.series.executors")
 
 gc.set_threshold(20_000, 20, 100)  # by default a tenth of the time, with all that the tests import
-
-if DISTRIBUTED:  # a thread for each process; read when numpy is loaded
-    os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -31,7 +27,7 @@ def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """One for all processes of pytest-xdist, so that an assembly is built once."""
     folder = tmp_path_factory.getbasetemp()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
+        patch.setenv("RIVETBENCH_CACHE", str((folder.parent if one_thread.DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
         patch.setattr("typer.testing._get_command", cache(get_command))
         _asked_once(patch)
