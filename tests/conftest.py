@@ -25,6 +25,7 @@ gc.set_threshold(20_000, 20, 100)  # by default a tenth of the time, with all th
 @pytest.fixture(autouse=True, scope="session")
 def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """One for all processes of pytest-xdist, so that an assembly is built once."""
+    gc.freeze()  # what has been imported is no garbage
     folder = tmp_path_factory.getbasetemp()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if one_thread.DISTRIBUTED else folder) / "cache"))
