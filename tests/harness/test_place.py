@@ -148,7 +148,7 @@ def test_fewest_are_near_optimum(strip: Path, session: PlanSession) -> None:
         optimum = next(
             count
             for count in range(len(candidates) + 1)
-            if any(search.whole(plan).gap_mm <= limit for plan in combinations(candidates, count))
+            if any(step.gap_mm <= limit for step in search.wholes([*combinations(candidates, count)]))
         )
         best, _ = search.fewest(search.whole(candidates))
         assert search.whole(best.plan).gap_mm == best.gap_mm <= limit
