@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 NOTHING_WRITTEN = ("", "Interrupted: nothing was written.")
+TRIED = "Interrupted. What was tried is kept: run the same command again."
 WIDTH_OF_A_LOG = 160
 MOST_FAULTS = 100  # shown at once
 LONGEST_LINE = 200  # characters of a file quoted in a message
@@ -162,3 +164,11 @@ def error_reporting(
     except KeyboardInterrupt:
         errors.print(interrupted, style="yellow")
         raise typer.Exit(INTERRUPTED) from None
+
+
+@contextmanager
+def resumable(**words: str) -> Iterator[Console]:
+    """As `error_reporting`, for work that the same command continues: SIGTERM interrupts it as Ctrl-C does."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with error_reporting(**words) as console:
+        yield console

@@ -1,6 +1,5 @@
 """The command `series`: many load cases on one assembly."""
 
-import signal
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from . import options
-from .options import error_reporting, option
+from .options import option
 
 
 @options.with_load_cases
@@ -82,7 +81,7 @@ def series(
     Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
                 3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
-    with error_reporting() as console:
+    with options.resumable() as console:
         from harness.commands.limit_search import tolerance as find_limit
         from harness.commands.load_case_series import run_series
         from harness.series.session import SeriesOptions
@@ -90,7 +89,6 @@ def series(
         from harness.terminal.console import ConsoleReporter, show_verdict
         from problems.errors import InputError
 
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         cases = replace(source(), contributors=contributors)
         settings = SeriesOptions(solver, form, *accuracy, threads, plugin, *limits)
