@@ -85,14 +85,11 @@ def read_side(name: str, key: str | None = None) -> Side:
 def refuse_other_options(side: Side) -> None:
     """Raise InputError if rows of one measurement have other options: they are no repeats of each other."""
     first: dict[str, str] = {}
-    faults: dict[Fault, None] = {}
     for row in side.rows:
         name, options = measurement(row), json.dumps(row.get("options") or {}, sort_keys=True)
         if first.setdefault(name, options) != options:
             allowed = f"{first[name]}, as in an earlier row of this measurement: these are no repeats"
-            faults[Fault(side.name, f"options of {name}", options, allowed)] = None
-    if faults:
-        raise InputError(list(faults)[:MAX_FAULTS])
+            raise InputError.one(side.name, f"options of {name}", options, allowed)
 
 
 def measurement(row: Row) -> str:
