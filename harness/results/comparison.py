@@ -16,8 +16,8 @@ from pathlib import Path
 
 from problems.errors import Fault, InputError
 
-from .records import MEASUREMENTS, Row, read
-from .row_validation import MAX_FAULTS, refuse_wrong_kinds
+from .records import Row
+from .row_validation import MAX_FAULTS, measured_rows
 from .schema import ROUND
 
 #: The fields that a comparison needs.
@@ -52,14 +52,7 @@ class Side:
 
 def read_rows(name: str) -> Side:
     """All rows of a directory. Raises InputError."""
-    path = Path(name) / MEASUREMENTS
-    if not path.is_file():
-        raise InputError.one("DIR", "directory", name, f"has no {path.name}; `run` creates one")
-    rows = read(path)
-    refuse_wrong_kinds(path, rows, needed=NEEDED)
-    if not rows:
-        raise InputError.one("DIR", "directory", name, f"{path.name} has no row yet")
-    return Side(name, rows)
+    return Side(name, measured_rows(Path(name), NEEDED))
 
 
 def read_side(name: str, key: str | None = None) -> Side:
