@@ -168,7 +168,7 @@ def error_reporting(
 
 @contextmanager
 def resumable(**words: str) -> Iterator[Console]:
-    """As `error_reporting`, for work that the same command continues: SIGTERM interrupts it as Ctrl-C does."""
+    """As `error_reporting`, of work that the same command continues; SIGTERM interrupts it as Ctrl-C does."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with error_reporting(**words) as console:
         yield console

@@ -69,7 +69,7 @@ class AnswerJournal:
 
 
 def form_of_search(path: Path, scene: JointScene, forms: Sequence[Form], cases: GapCases, items: int) -> Form:
-    """The form of the answers in a journal, if it is one of `forms`, else the cheaper one for so many items."""
+    """The form of the answers in a journal, if it is one of `forms`; else the cheaper, for so many items."""
     wanted: Form | None = None
     with suppress(OSError, ValueError), path.open("rb") as file:
         recorded = records.parsed(file.readline()).get("form")
