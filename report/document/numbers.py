@@ -42,7 +42,7 @@ def upwards(bound: float, digits: int = 2) -> str:
 def rounded_up(bound: object) -> str:
     """0.0913: three digits of a bound above 0.0912, never less than it is; inf where there is none."""
     shown = raised(bound)
-    return "inf" if shown is None else f"{shown:.3g}"
+    return "inf" if shown is None else f"{shown:g}"
 
 
 def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:
