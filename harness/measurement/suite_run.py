@@ -35,7 +35,7 @@ from harness.verification.reference_problem import (
     record,
     record_refusal,
 )
-from problems.forms import form_family
+from problems.forms import default_form, form_family
 from problems.forms.problem import in_form
 from problems.scene_files import read_scene
 from report.document.numbers import counted, upwards
@@ -60,7 +60,7 @@ def run(
         suite = with_key(suite, key)
     pairs = list(zip(suite.solver, describe(suite, ConsoleReporter(console)), strict=True))
     solvers = {(e.name, e.label): d for e, d in pairs}
-    filled = [e.model_copy(update={"forms": e.forms or [d.default_form]}) for e, d in pairs]
+    filled = [e.model_copy(update={"forms": e.forms or [default_form(d.forms)]}) for e, d in pairs]
     suite = suite.model_copy(update={"solver": filled})
     plan = expand(suite)
     if key is not None:
