@@ -57,8 +57,9 @@ def without_pictures(blank_pictures: None, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.fixture
 def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A series writes its rows and gaps alone."""
-    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
+    """A series writes its rows and gaps alone, a run its rows and answers."""
+    for writer in ("series_report", "suite_report"):
+        monkeypatch.setattr(f"report.writers.{writer}.write", lambda directory: directory)
 
 
 @pytest.fixture(scope="session")
