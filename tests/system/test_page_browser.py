@@ -24,7 +24,7 @@ from report.results.series_results import read as read_series
 from report.writers.answer_report import write as write_solution
 from report.writers.series_report import write as write_series
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blank_pictures")]
 LOADS = itertools.count()
 SEEN = "[...document.querySelectorAll('#tables td[data-key]')]"
 NAMED = r"td.title.split('\n')[0].split(' on ')"  # label and scene
