@@ -1,15 +1,16 @@
 """What all tests share: a cache of their own, so that none reads or fills the user's; pictures of few pixels,
-drawn in a quarter of the time; garbage that is looked for less often; quick tests first."""
+drawn in a quarter of the time; what git says of this project, asked once, where each session, answer and
+report asks four times; garbage that is looked for less often; quick tests first."""
 
 import gc
 import os
 import shutil
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
-from forked_processes import fork_measuring_processes
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 SHARED = ("chromium", "cluster")  # fixtures that take long to make
@@ -17,8 +18,20 @@ ON_WORKERS = ("harness.measurement.task", "harness.placement.session", "harness.
 
 gc.set_threshold(20_000, 20, 100)  # by default a tenth of the time, with all that the tests import
 
-if DISTRIBUTED:  # a thread for each process; read when numpy is loaded
+if DISTRIBUTED:  # a thread for each process; read when numpy is loaded, which these imports do
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+from forked_processes import fork_measuring_processes  # noqa: E402
+
+from harness.results import provenance  # noqa: E402
+
+ASK_GIT, PROJECT = provenance._git, provenance.ROOT
+ask_git_once = cache(ASK_GIT)
+
+
+def _git(*arguments: str) -> str | None:
+    """It is asked again only of the trees that tests make."""
+    return (ask_git_once if provenance.ROOT == PROJECT else ASK_GIT)(*arguments)
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -28,6 +41,7 @@ def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
+        patch.setattr(provenance, "_git", _git)
         yield
 
 
