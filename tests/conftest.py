@@ -1,6 +1,7 @@
 """What all tests share: a cache of their own, so that none reads or fills the user's; pictures of few pixels,
-drawn in a quarter of the time; what git says of this project, asked once, where each session, answer and
-report asks four times; garbage that is looked for less often; quick tests first."""
+drawn in a quarter of the time; what is the same each time, made once: the command line, and what git and the
+installed packages say, which each session, answer and report asks; garbage that is looked for less often;
+quick tests first."""
 
 import gc
 import os
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.main import get_command
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 SHARED = ("chromium", "cluster")  # fixtures that take long to make
@@ -42,6 +44,8 @@ def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
         patch.setattr(provenance, "_git", _git)
+        patch.setattr(provenance, "version", cache(provenance.version))
+        patch.setattr("typer.testing._get_command", cache(get_command))
         yield
 
 
