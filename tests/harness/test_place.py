@@ -294,7 +294,8 @@ def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: P
     scene = read_scene(str(tmp_path / "a" / "plan.toml"))
     assert [effect.kind for effect in scene.effects] == ["fasteners", "measured_gap"]
     assert load_case(scene, effects=scene.effects).g[0] == pytest.approx(0.03)
-    assert place(strip, tmp_path / "b", "--count", 2, "--mean", 0.2).exit_code == 0
+    few = "--candidates", "1x3", "--count", 2
+    assert place(strip, tmp_path / "b", *few, "--mean", 0.2).exit_code == 0
     scene = read_scene(str(tmp_path / "b" / "own.toml"))
     (gap,) = (effect for effect in scene.effects if effect.kind == "initial_gap")
     assert (gap.mean, gap.random.sd, gap.random.correlation_length) == (0.2, 0.02, 60.0)
@@ -312,7 +313,7 @@ def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     gaps = random_gaps(MovableFasteners.of(read_scene(str(strip))).bare, 40, 7)
     for rows in (40, 1):
         np.savetxt(tmp_path / f"{rows}.csv", [gaps.load(k).g for k in range(rows)], delimiter=",")
-    goal = ("--candidates", "2x6", "--allow-gap", 0.08, "--out")
+    goal = ("--candidates", "2x4", "--allow-gap", 0.08, "--out")
     many = harness("place", strip, "--gaps", tmp_path / "40.csv", "--share", 0.8, *goal, tmp_path / "many")
     assert "Every second row is held back" in many.output
     assert re.search(r"keeps? 0\.08 mm in (all|[\d.]+ % of) 20 held-back rows \(95 % interval", many.output)
@@ -473,7 +474,7 @@ def test_the_command_finds_a_plan_that_solve_confirms(
 @pytest.mark.usefixtures("without_report", "without_pictures")
 def test_no_fastener_at_all_is_a_plan(strip: Path, tmp_path: Path) -> None:
     """Where the limit is larger than the gap without fasteners."""
-    assert place(strip, tmp_path, "--allow-gap", 9.0).exit_code == 0
+    assert place(strip, tmp_path, "--candidates", "1x3", "--allow-gap", 9.0).exit_code == 0
     assert records_of(tmp_path)["best"]["plan"] == []
     effects = read_scene(str(tmp_path / "plan.toml")).effects
     assert not any(effect.kind == "fasteners" for effect in effects)
