@@ -14,9 +14,7 @@ from problems.load_cases import Listed
 from problems.model.stage_answers import last_scene
 
 
-def study_of(
-    path: Path, patches: str, limits: tuple[float, float] = (inf, inf), ends: int = 1
-) -> ShimStudy:
+def study_of(path: Path, patches: str, limits: tuple[float, float] = (inf, inf), ends: int = 1) -> ShimStudy:
     """Of the scene's own gap."""
     scene = scene_at(path)
     bare = last_scene(scene)
@@ -27,6 +25,4 @@ def study_of(
 def search_of(session: PlanSession, limit_mm: float, stock: tuple[float, ...]) -> ShimSearch:
     """In the only case, which may not fail."""
     assert isinstance(session.study, ShimStudy)
-    return ShimSearch(
-        lambda some: [session.answer(q) for q in some], 1, 0, limit_mm, session.study, stock
-    )
+    return ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, limit_mm, session.study, stock)

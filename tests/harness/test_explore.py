@@ -330,7 +330,8 @@ def test_the_outcome_in_words(path: Path) -> None:
     assert ">PASS<" in explore_page.outcome(answer, places, largest * 2)
     proven = explorer.proven(answer)
     assert "proven" in explore_page.outcome(proven, places, largest * 2)
-    assert ">cannot be told<" in explore_page.outcome(replace(proven, error_mm=largest), places, largest * 1.1)
+    unsure = replace(proven, error_mm=largest)
+    assert ">cannot be told<" in explore_page.outcome(unsure, places, largest * 1.1)
 
 
 def test_the_raster_shows_every_contact_where_it_is() -> None:
