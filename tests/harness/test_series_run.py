@@ -113,31 +113,31 @@ def test_another_series_is_refused(change: tuple[str, str]) -> None:
 
 LIMITS = SeriesOptions()
 KILLED = "killed by SIGKILL, perhaps by the system because memory ran out"
+#: How a case ended, and whether it is tried again.
+ENDS: list[tuple[dict[str, Any], bool]] = [
+    ({"status": "time_limit", "time_limit_s": LIMITS.time_limit_s}, False),
+    ({"status": "time_limit", "time_limit_s": LIMITS.time_limit_s / 2}, True),
+    ({"status": "memory_limit", "memory_limit_mib": LIMITS.memory_limit_mib}, False),
+    ({"status": "memory_limit", "memory_limit_mib": LIMITS.memory_limit_mib // 2}, True),
+    ({"status": "memory_limit"}, True),
+    ({"status": "crashed", "message": "killed by SIGSEGV"}, False),
+    ({"status": "crashed", "message": KILLED}, True),
+    ({"status": "failed", "message": "ValueError: no step"}, False),
+]
 
 
-@pytest.mark.parametrize(
-    ("end", "again"),
-    [
-        ({"status": "time_limit", "time_limit_s": LIMITS.time_limit_s}, False),
-        ({"status": "time_limit", "time_limit_s": LIMITS.time_limit_s / 2}, True),
-        ({"status": "memory_limit", "memory_limit_mib": LIMITS.memory_limit_mib}, False),
-        ({"status": "memory_limit", "memory_limit_mib": LIMITS.memory_limit_mib // 2}, True),
-        ({"status": "memory_limit"}, True),
-        ({"status": "crashed", "message": "killed by SIGSEGV"}, False),
-        ({"status": "crashed", "message": KILLED}, True),
-        ({"status": "failed", "message": "ValueError: no step"}, False),
-    ],
-)
-def test_a_case_is_tried_again_if_its_cause_may_have_passed(
-    end: dict[str, Any], again: bool, tmp_path: Path
-) -> None:
-    command = "--cases", "3", "--out", str(tmp_path)
+def test_a_case_is_tried_again_if_its_cause_may_have_passed(tmp_path: Path) -> None:
+    command = "--cases", str(len(ENDS)), "--out", str(tmp_path)
     series(*command)
-    row = rows_of(str(tmp_path))[1]
-    lost = {"case": 1, "gap_seed": row["gap_seed"], "verdict": "no_answer", "message": "", **end}
-    series_file.append(tmp_path, [(lost, None)])
-    assert f"3 cases, {3 - again} already" in series(*command, code=0 if again else 1).output
-    assert rows_of(str(tmp_path))[1]["verdict"] == ("within" if again else "no_answer")
+    lost = {"verdict": "no_answer", "message": ""}
+    rows = [
+        lost | end | {name: row[name] for name in ("case", "gap_seed")}
+        for row, (end, _) in zip(rows_of(str(tmp_path)), ENDS, strict=True)
+    ]
+    series_file.append(tmp_path, [(row, None) for row in rows])
+    again = [again for _, again in ENDS]
+    assert f"8 cases, {again.count(False)} already" in series(*command, code=1).output
+    assert [row["verdict"] == "within" for row in rows_of(str(tmp_path))] == again
 
 
 def test_memory_that_ran_out_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
