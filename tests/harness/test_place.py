@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import tomllib
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import replace
@@ -407,23 +406,27 @@ def place(path: Path, out: Path, *words: object) -> Any:
     return harness("place", path, "--candidates", "2x6", "--cases", 6, "--share", 1, "--out", out, *words)
 
 
+#: Words of a search that asks little: it compares all plans of two of four places.
+FEW = ("--candidates", "1x4", "--count", 2)
+
+
 @pytest.fixture(scope="module")
-def whole(strip: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The directory of a finished search, which tests copy, and what its command says."""
-    out = tmp_path_factory.mktemp("whole") / "out"
+def compared(strip: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of that search, without its report."""
+    out = tmp_path_factory.mktemp("compared")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("report.writers.series_report.write", lambda directory: directory)
-        done = place(strip, out, "--allow-gap", 0.05)
-    assert done.exit_code == 0, done.output
-    return out, done.output
+        patch.setattr("report.writers.place_report.write", Path)
+        assert place(strip, out, *FEW).exit_code == 0
+    return out
 
 
 @pytest.mark.slow
 def test_the_command_finds_a_plan_that_solve_confirms(
-    strip: Path, tmp_path: Path, whole: tuple[Path, str], request: pytest.FixtureRequest
+    strip: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    shutil.copytree(whole[0], tmp_path / "out")
-    said, record = whole[1], records_of(tmp_path / "out")
+    done = place(strip, tmp_path / "out", "--allow-gap", 0.05)
+    assert done.exit_code == 0, done.output
+    said, record = done.output, records_of(tmp_path / "out")
     best, plan = record["best"], tmp_path / "out" / "plan.toml"
     assert best["fasteners"] < len(record["candidates"])
     assert best["gap_mm"] <= 0.05
@@ -483,22 +486,23 @@ def test_no_fastener_at_all_is_a_plan(strip: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_report", "without_pictures")
 def test_an_interrupted_search_goes_on(
-    strip: Path, tmp_path: Path, whole: tuple[Path, str], monkeypatch: pytest.MonkeyPatch
+    strip: Path, tmp_path: Path, compared: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """While the plan of the best estimates is proven."""
     keep, kept = AnswerJournal._keep, [0]
 
     def interrupted(self: AnswerJournal, *answer: Any) -> None:
         keep(self, *answer)
         kept[0] += 1
-        if kept[0] == 17:
+        if kept[0] == 7:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(AnswerJournal, "_keep", interrupted)
-        assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 130
-    assert len((tmp_path / "parts" / PLANS).read_text().splitlines()) == 1 + 17
-    assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 0
-    assert records_of(whole[0]) == records_of(tmp_path / "parts")
+        assert place(strip, tmp_path / "parts", *FEW).exit_code == 130
+    assert len((tmp_path / "parts" / PLANS).read_text().splitlines()) == 1 + 7
+    assert place(strip, tmp_path / "parts", *FEW).exit_code == 0
+    assert records_of(compared) == records_of(tmp_path / "parts")
 
 
 def test_workers_get_the_rows_of_their_question(
@@ -558,11 +562,10 @@ def test_figures_without_a_bound_are_read_again(
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_report", "without_pictures")
-def test_workers_find_the_same(strip: Path, tmp_path: Path, whole: tuple[Path, str], cluster: Any) -> None:
-    address = cluster.scheduler_address
-    two = place(strip, tmp_path / "two", "--allow-gap", 0.05, "--scheduler", address)
+def test_workers_find_the_same(strip: Path, tmp_path: Path, compared: Path, cluster: Any) -> None:
+    two = place(strip, tmp_path / "two", *FEW, "--scheduler", cluster.scheduler_address)
     assert two.exit_code == 0, two.output
-    assert records_of(whole[0]) == records_of(tmp_path / "two")
+    assert records_of(compared) == records_of(tmp_path / "two")
 
 
 def records_of(directory: Path) -> dict[str, Any]:
