@@ -77,9 +77,9 @@ def without_pictures(blank_pictures: None, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.fixture
 def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A series writes its rows and gaps alone, a run its rows and answers."""
-    for writer in ("series_report", "suite_report"):
-        monkeypatch.setattr(f"report.writers.{writer}.write", lambda directory: directory)
+    """A series writes its rows and gaps alone, a run its rows and answers, a search its plans."""
+    for kind in ("series", "suite", "place", "shim"):
+        monkeypatch.setattr(f"report.writers.{kind}_report.write", lambda directory: directory)
 
 
 @pytest.fixture(scope="session")

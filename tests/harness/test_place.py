@@ -278,7 +278,7 @@ def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: Path) -> None:
     """The scan in place of the scene's gap, or the law that options gave; `solve` takes them from there."""
     scan, holes = tmp_path / "scan.csv", tmp_path / "holes.csv"
@@ -307,7 +307,7 @@ def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: P
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     gaps = random_gaps(MovableFasteners.of(read_scene(str(strip))).bare, 40, 7)
     for rows in (40, 1):
@@ -326,7 +326,7 @@ def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     assert "half of 40 rows are held back: take 144 rows, or a share of 1" in few.output
 
 
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_plan_for_joints_that_vary_as_scans_do(strip: Path, tmp_path: Path) -> None:
     """Fresh joints of the same modes decide, and are the series of the plan."""
     random = np.random.default_rng(2)
@@ -474,7 +474,7 @@ def test_the_command_finds_a_plan_that_solve_confirms(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_no_fastener_at_all_is_a_plan(strip: Path, tmp_path: Path) -> None:
     """Where the limit is larger than the gap without fasteners."""
     assert place(strip, tmp_path, "--candidates", "1x3", "--allow-gap", 9.0).exit_code == 0
@@ -484,7 +484,7 @@ def test_no_fastener_at_all_is_a_plan(strip: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_report")
 def test_an_interrupted_search_goes_on(
     strip: Path, tmp_path: Path, compared: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -561,7 +561,7 @@ def test_figures_without_a_bound_are_read_again(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_report")
 def test_workers_find_the_same(strip: Path, tmp_path: Path, compared: Path, cluster: Any) -> None:
     two = place(strip, tmp_path / "two", *FEW, "--scheduler", cluster.scheduler_address)
     assert two.exit_code == 0, two.output
@@ -576,7 +576,7 @@ def records_of(directory: Path) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_limit_that_no_plan_keeps_says_where_and_by_how_much(strip: Path, tmp_path: Path) -> None:
     done = place(strip, tmp_path / "out", "--allow-gap", 0.001)
     assert done.exit_code == 4
@@ -721,7 +721,7 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["place", "shim"])
-@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.usefixtures("without_report")
 def test_a_file_that_changes_during_the_search_changes_no_plan(
     command: str, strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

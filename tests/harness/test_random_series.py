@@ -145,7 +145,7 @@ def test_a_key_of_K_has_a_K_for_each_of_its_values(tmp_path: Path) -> None:
     assert np.isnan(slopes).tolist() == [True, True, False]
 
 
-@pytest.mark.usefixtures("without_report")
+@pytest.mark.usefixtures("without_pictures")
 def test_searches_draw_what_a_series_draws(scene: Path, tmp_path: Path) -> None:
     """The proven gaps of the scene's own fasteners, and the largest of the preloads that are drawn."""
     assert harness("series", scene, "--cases", 3, "--out", tmp_path / "series").exit_code == 0

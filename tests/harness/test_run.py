@@ -27,7 +27,7 @@ from harness.results.records import Row
 from problems.errors import InputError
 from studies.smaller_results import pack
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blank_pictures")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
 CONTRACT = {
     "suite", "scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeat",

@@ -214,6 +214,7 @@ def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path,
     assert not (tmp_path / "out" / "shims.jsonl").exists()
 
 
+@pytest.mark.usefixtures("without_report")
 def test_a_scene_whose_effects_are_inline_tables_is_shimmed(tmp_path: Path) -> None:
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(INLINE + two_parts())
@@ -359,6 +360,7 @@ def test_the_command_finds_shims_that_solve_confirms(
     assert "allow_force" in other.output
 
 
+@pytest.mark.usefixtures("without_report")
 def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
     """Whose gap is as given."""
     path = tmp_path / "flat.toml"
@@ -420,6 +422,7 @@ def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("without_report")
 @pytest.mark.parametrize(("command", "row"), [("shim", 2), ("place", 0)])
 def test_no_answer_of_a_table_that_has_changed_is_used(
     strip: Path, tmp_path: Path, command: str, row: int
