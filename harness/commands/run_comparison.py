@@ -7,7 +7,7 @@ import pandas as pd
 
 from harness.results.atomic_output import refuse_unwritable
 from harness.results.comparison import Incomparable, Side, measurement, read_side, refuse_incomparable
-from harness.results.records import MEASUREMENTS
+from harness.results.records import MEASUREMENTS, refuse_other_command
 from problems.errors import read_all
 from report.analysis.comparison import compared
 from report.document.escape import quoted
@@ -51,7 +51,7 @@ def compare(
     Raises
     ------
     InputError
-        If a directory has no rows.
+        If a directory has no rows, or `out` has such files of something else.
     Incomparable
         If the runs are of other problems or limits, or `max_slowdown` is given and the machines differ.
 
@@ -71,6 +71,7 @@ def compare(
     names = [str(new)] if isinstance(new, str | Path) else list(map(str, new))
     if out is not None:
         refuse_unwritable(Path(out), [Path(name) / MEASUREMENTS for name in (str(old), *names)])
+        refuse_other_command(Path(out), "comparison.md", ("comparison.csv", "index.html"))
     base, *sides = read_all(lambda name: read_side(name, key), [str(old), *names])
     comparisons = [_compared(base, side, max_digits_lost, max_slowdown) for side in sides]
     if out is not None:
