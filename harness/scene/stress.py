@@ -4,7 +4,7 @@ No stress is off by more than its sensitivity (problems/model/stress.py) times �
 bounds for the x that is stored, with its rounding. To an answer of a solver its distance from the reference
 is added. The sparse form has all unknowns in x. In the dense forms those inside a part are recovered, and
 ‖x − x*‖_K is that of all of them, too; the roundings of condensation and recovery are not counted. Nor is the
-error of the mesh (mesh_error.py).
+error of the mesh (mesh_error.py). No error is known if fasteners have locked what is not proven.
 
 The sensitivity of a row s of a recovery matrix is ‖s‖_{K⁻¹} ≤ ‖z‖_K + ‖r‖₂/√κ in balanced units, r = s − K z
 with z ≈ K⁻¹s, κ ≤ λmin(K). r is rounded by γ_{n+2} (‖s‖₂ + ‖K‖_∞ ‖z‖₂).
@@ -182,7 +182,8 @@ def stresses(solution: Solution) -> Stresses:
     proof = proof_of(problem.prepared)
     energy = proof.energy_error(problem.load, reference.x, reference.lam)
     point_sensitivities = sensitivities(problem.scene, proof) or [part.sensitivity for part in parts]
-    errors = [energy * one for one in point_sensitivities]
+    locks = np.inf if solution.stages and not np.isfinite(solution.gap_error_mm).all() else 0.0
+    errors = [energy * one + locks for one in point_sensitivities]
     if not solution.from_reference:
         exact = stresses_of(problem.scene, reference.x)
         for part, other, error in zip(parts, exact, errors, strict=True):
