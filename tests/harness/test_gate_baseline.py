@@ -277,6 +277,15 @@ def test_a_factor_that_is_no_number_passes_nothing(option: str, finished: Path) 
     assert f"{option}: factor = nan: 1 or larger" in done.stderr
 
 
+def test_the_outcome_is_said_also_if_the_page_cannot_be_written(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path))  # a folder
+    done = gate(finished)
+    assert done.exit_code == 2
+    assert "Passed: all 2 gated rows" in done.stdout
+
+
 def test_the_page_of_a_job_has_the_outcome(
     copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
