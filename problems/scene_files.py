@@ -67,6 +67,7 @@ def read_scene(name_or_path: str) -> Scene:
     if path.suffix == ".npz":
         if not path.is_file():
             raise InputError.one(path, "scene", name_or_path, "no such file")
+        path = path.absolute()  # read when it is solved: perhaps in another folder, or by a worker
         return MatricesScene(path.stem, f"own matrices {path.name}", (("problem", path),), sources=(path,))
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
@@ -75,7 +76,7 @@ def read_scene(name_or_path: str) -> Scene:
     table = read_toml(path)
     is_users = not resolved(path).is_relative_to(SCENES)
     name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()
-    sources = tuple(_files_of(path, table))
+    sources = tuple(file.absolute() for file in _files_of(path, table))
     return replace(_scene(name, path, table), sources=sources)
 
 
@@ -255,7 +256,7 @@ def _matrices_scene(name: str, title: str, path: Path, data: dict[str, Any]) -> 
         elif not (path.parent / str(value)).is_file():
             faults.append(Fault(str(path), f"matrices.{key}", value, "no such file"))
         else:
-            files.append((key, path.parent / str(value)))
+            files.append((key, (path.parent / str(value)).absolute()))
     if not faults and set(table) not in ({"problem"}, set("KAfg")):
         faults.append(Fault(str(path), "matrices", sorted(table), "K, A, f and g, or problem alone"))
     if faults:
