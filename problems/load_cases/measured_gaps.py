@@ -97,7 +97,9 @@ def measured_gaps(
         raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
     gaps, notes = gaps[:count], list[str]()
     if options.missing:
-        gaps = np.where(np.isin(gaps, options.numbers), np.nan, gaps)
+        with np.errstate(over="ignore"):  # in single precision 1e36 is another number
+            marks = np.array(options.numbers, gaps.dtype if gaps.dtype.kind == "f" else float)
+        gaps = np.where(np.isin(gaps, marks), np.nan, gaps)
     if options.missing and isinstance(scene, JointScene):
         gaps, lost = _completed(scene.joint, gaps)
         notes = [f"{path}: {lost} missing gaps are taken from the nearest contact of their case"] * bool(lost)

@@ -98,7 +98,7 @@ def test_load_cases_have_paths_or_texts_and_possible_numbers(tmp_path: Path) -> 
         with pytest.raises(InputError) as caught:
             harness.run_series(scene, tmp_path / "none", wrong)
         assert [fault.where for fault in caught.value.faults] == ["--cases", "--seed"]
-    pair = [GapCases(count=2, seed=3), GapCases(count=np.int64(2), seed=np.int64(3))]  # type: ignore[arg-type]
+    pair = [GapCases(2, 3), GapCases(np.int64(2), np.int64(3))]  # type: ignore[arg-type]
     assert len({cases.of(scene, "dual").key for cases in pair}) == 1
 
 
