@@ -229,6 +229,9 @@ def _write_test_set(suite: str, out: Path, form: Form, console: Console) -> Path
 
     refuse_unwritable(out)
     scenes = [scene for scene in map(read_scene, read_suite(suite).scenes) if not scene.refused]
+    names = [scene.name for scene in scenes]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError.one(suite, "scenes", twice, "names of their own: results are told apart by these")
     numbers = pa.list_(pa.float64())
     schema = pa.schema([(name, pa.string() if name == "name" else numbers) for name in TEST_SET])
 
