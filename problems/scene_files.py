@@ -97,7 +97,7 @@ def _as_toml(value: Any) -> Any:
         return {key: _as_toml(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
         return [_as_toml(inner) for inner in value]
-    return value.tolist() if isinstance(value, np.ndarray) else value
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def _unknown_scene(name: str, known: list[str]) -> InputError:

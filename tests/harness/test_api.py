@@ -63,6 +63,8 @@ def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> N
     gap, fasteners, *others = table["effect"]
     effects = (gap, Fasteners.model_validate(fasteners), *others)
     scenes.append(load_scene({"joint": Joint.model_validate(table["joint"]), "effect": effects}))
+    gap["random"]["seed"] = np.int64(gap["random"]["seed"])
+    scenes.append(load_scene(table))
     assert len({scene.key for scene in scenes}) == 1
     assert load_scene(scenes[0]) is scenes[0]
 
@@ -76,6 +78,7 @@ def test_every_function_takes_a_scene_as_an_object_or_a_dict(tmp_path: Path) -> 
         harness.export(source, tmp_path / f"{n}.npz", format="npz") for n, source in enumerate(sources)
     ]
     assert len({load_scene(path).key for path in written}) == 1
+    assert harness.import_matrices(written[0], tmp_path / "again.npz").exists()
     sweep: Any = {"sweep": ["initial_gap.mean=0.4,0.5"], "options": harness.SeriesOptions(check=0)}
     done = [harness.run_series(source, tmp_path / f"{n}", **sweep) for n, source in enumerate(sources)]
     assert len({tuple(row["max_gap_mm"] for row in one.rows) for one in done}) == 1

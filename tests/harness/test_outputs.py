@@ -113,3 +113,10 @@ def test_refused_before_work(command: str, out: str, tmp_path: Path, monkeypatch
     assert out in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "locked"]
+
+
+@pytest.mark.parametrize("option", ["--json", "--junit"])
+def test_a_folder_is_no_file_of_findings(option: str, tmp_path: Path) -> None:
+    done = harness("gate", tmp_path, option, tmp_path)
+    assert done.exit_code == 2
+    assert "cannot be written: it is a folder" in done.stderr
