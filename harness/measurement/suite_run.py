@@ -113,7 +113,7 @@ Outcomes = Callable[
 def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Iterator[Outcomes]:
     """One measurement after another here, or one at a time on each worker of a scheduler."""
     if scheduler is None:
-        answers = directory / "answers"
+        answers = (directory / "answers").absolute()  # a solver may go to another folder
         yield lambda tasks: ((pending, run_task(task, answers)) for pending, task in filter(None, tasks))
         return
     with workers(scheduler, console) as (executor, count):

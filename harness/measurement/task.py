@@ -72,7 +72,12 @@ def run_task_on_worker(task: Task) -> TaskResult:
 def rows_of(
     task: Task, result: TaskResult, problem: ReferenceProblem, directory: Path, origin: Origin
 ) -> list[Row]:
-    """The rows of a task, its answers judged."""
+    """The rows of a task, its answers judged. Raises OSError if one could not be saved: that is no failure of
+    its solver.
+    """
+    for report in result.reports:
+        if "cannot_save" in report:
+            raise OSError(report["cannot_save"])
     answers = [directory / "answers" / f"{m.stem}.npz" for m in task.batch]
     for answer, content in zip(answers, result.files or (), strict=bool(result.files)):
         if content is not None:
