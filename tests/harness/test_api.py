@@ -253,7 +253,7 @@ def test_the_plugin_of_a_series_is_a_text_or_a_path(tmp_path: Path, monkeypatch:
     strip, few = write_strip(tmp_path), GapCases(count=1)
     harness.run_series(strip, "out", few, options, report=False)
     assert jobs[0].plugin == tmp_path / "exact.py"
-    with pytest.raises(InputError, match="--plugin: scene = .*`export` makes one"):
+    with pytest.raises(InputError, match=r"--plugin: scene = .*`export` makes one"):
         harness.run_series(own_matrices(*matrices()[2]), "out", few, options)
 
 
