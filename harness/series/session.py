@@ -88,7 +88,10 @@ class SeriesOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Job(SeriesOptions):
-    """The cases of a series, and how they are solved. threads : None: as they are."""
+    """The cases of a series, and how they are solved.
+
+    threads : None: as they are. scene_key : that of the scene where its files were read; "": not told.
+    """
 
     scene: Scene
     cases: LoadCases
@@ -96,6 +99,7 @@ class Job(SeriesOptions):
     plugin: Path | None = None
     solver_options: dict[str, Any] = field(default_factory=dict)
     key: str = field(default_factory=lambda: uuid4().hex)
+    scene_key: str = ""
 
 
 class Result(NamedTuple):
