@@ -107,7 +107,7 @@ def stress_record(assembly_stress: Stresses, mesh: MeshError | None, allowed: fl
     said += f"; proven to {upwards(largest['error'])}"
     grid = None if mesh is None else mesh.stress
     said += ", mesh error not known" if grid is None else f", mesh error about {grid:.1g} N/mm²"
-    if none := [part.part for part in assembly_stress.parts if not len(part.places)]:
+    if none := [part.part for part in assembly_stress.parts if part.near_force.all()]:  # or no point at all
         said += f", none known of {', '.join(none)}"
     record: dict[str, Any] = {"largest": largest, "mesh_error": grid, "kind": ""}
     if allowed is None:
@@ -130,11 +130,14 @@ def refuse_unusable(allowed: float | None, scene: Scene) -> None:
 def largest_of(
     scene: JointScene, x: Vector, energy: float = 0.0, point_sensitivities: Sequence[Vector] = ()
 ) -> float:
-    """The largest von Mises stress away from forces at points, N/mm², no less than it can be.
+    """The largest von Mises stress away from forces at points, N/mm², no less than it can be; infinite
+    if no place is away from them.
 
     x : as in `stresses_of`, ± energy, ‖x − x*‖_K. point_sensitivities : see `sensitivities`.
     """
     parts, largest = stresses_of(scene, x), 0.0
+    if all(part.near_force.all() for part in parts):
+        return np.inf
     for part, error in zip(parts, point_sensitivities or [part.sensitivity for part in parts], strict=True):
         with np.errstate(over="ignore", invalid="ignore"):
             upper = part.von_mises + (energy * error if energy else 0.0)  # an error may be infinite
