@@ -184,7 +184,7 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task(batch, self.solvers[m.solver, m.entry.label])
+            task = Task(batch, self.solvers[m.solver, m.entry.label], problem.scene.key)
             self.running[m.key] = m
             yield (task, problem), task
 

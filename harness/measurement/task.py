@@ -15,7 +15,9 @@ from harness.results.schema import MEASURED, STEPS, MeasurementRow, Origin, Prov
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
+from problems.errors import InputError
 from problems.forms.problem import in_form
+from problems.scene_files import read_scene
 from report.document.numbers import upwards
 
 from .solver_descriptions import Description
@@ -24,10 +26,14 @@ from .worker import FinishedReport, measure, scene_to_measure
 
 @dataclass(frozen=True)
 class Task:
-    """The work of one process: a measurement, or load cases of a series."""
+    """The work of one process: a measurement, or load cases of a series.
+
+    scene_key : that of the scene where its file was read; "": not told.
+    """
 
     batch: list[Measurement]
     solver: Description
+    scene_key: str = ""
 
 
 @dataclass(frozen=True)
@@ -58,8 +64,14 @@ def run_task(task: Task, answers: Path) -> TaskResult:
 
 
 def run_task_on_worker(task: Task) -> TaskResult:
-    """Measure on a worker of a scheduler, which has the assembly in its own cache, or builds it first."""
+    """Measure on a worker of a scheduler, which has the assembly in its own cache, or builds it first.
+
+    Raises InputError if its file of the scene is another.
+    """
     first = task.batch[0]
+    if task.scene_key not in ("", read_scene(first.source).key):
+        allowed = "that of the driver: copy the files to this worker"
+        raise InputError.one(first.source, "scene", "another", allowed)
     scene = scene_to_measure(task.batch)
     _ = in_form(prepared(scene, form=first.form), first.form).arrays  # made before the clock starts
     with tempfile.TemporaryDirectory() as folder:
