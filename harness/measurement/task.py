@@ -28,7 +28,7 @@ from .worker import FinishedReport, measure, scene_to_measure
 class Task:
     """The work of one process: a measurement, or load cases of a series.
 
-    scene_key : that of the scene where its file was read; "": not told.
+    scene_key : that of the scene on whose reference the answers are judged; "": not told.
     """
 
     batch: list[Measurement]
@@ -51,7 +51,14 @@ class TaskResult:
 
 
 def run_task(task: Task, answers: Path) -> TaskResult:
-    """Measure; the answer files go into the directory `answers`."""
+    """Measure; the answer files go into the directory `answers`.
+
+    Raises InputError if the file of the scene is another than that on which they are judged.
+    """
+    source = task.batch[0].source
+    if task.scene_key not in ("", read_scene(source).key):
+        allowed = "the file that the run has read: it has changed since, or is another on this worker"
+        raise InputError.one(source, "scene", "another", allowed)
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[FinishedReport]
     if task.solver.failure:
@@ -64,14 +71,8 @@ def run_task(task: Task, answers: Path) -> TaskResult:
 
 
 def run_task_on_worker(task: Task) -> TaskResult:
-    """Measure on a worker of a scheduler, which has the assembly in its own cache, or builds it first.
-
-    Raises InputError if its file of the scene is another.
-    """
+    """Measure on a worker of a scheduler, which has the assembly in its own cache, or builds it first."""
     first = task.batch[0]
-    if task.scene_key not in ("", read_scene(first.source).key):
-        allowed = "that of the driver: copy the files to this worker"
-        raise InputError.one(first.source, "scene", "another", allowed)
     scene = scene_to_measure(task.batch)
     _ = in_form(prepared(scene, form=first.form), first.form).arrays  # made before the clock starts
     with tempfile.TemporaryDirectory() as folder:
