@@ -56,7 +56,6 @@ def on_workers(
     """Blocks of cases, small enough that the workers end together. What fails is left for another run."""
     size = min(max(len(remaining) // (4 * count), 1), BLOCK)
     blocks = [remaining[start : start + size] for start in range(0, len(remaining), size)]
-    job = replace(job, scene_key=job.scene.key)
     tasks = ((block, (replace(job, cases=job.cases.only(block)), block)) for block in blocks)
     for block, outcome in done_as_completed(executor, count, solve_on_worker, tasks):
         if isinstance(outcome, BaseException):
@@ -96,6 +95,7 @@ def solve_isolated(
 def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
     """Solve the cases of a task in the child process; each result is an event."""
     job, numbers, batched = task
+    refuse_other_matrices(job)
 
     def report(**event: Any) -> None:
         events.report(**event)
@@ -124,19 +124,21 @@ def ended(job: Job, case: int, end: Row) -> Row:
     }
 
 
+def refuse_other_matrices(job: Job) -> None:
+    """Raise InputError if the files of matrices are others than those that the series began with."""
+    if job.scene_key not in ("", job.scene.key):
+        allowed = "those that the series has read: they have changed since, or are others on this worker"
+        raise InputError.one(job.scene.source_of("K"), "matrices", "others", allowed)
+
+
 @in_turn
 def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
-    """Cases of a job, in the session that this process keeps for it: each worker opens the assembly once.
-
-    Raises InputError if the files of matrices are others here.
-    """
+    """Cases of a job, in the session that this process keeps for it: each worker opens the assembly once."""
     job, numbers = task
-    if job.key not in _sessions and job.scene_key not in ("", job.scene.key):
-        allowed = "those that the driver has read: copy the files to this worker"
-        raise InputError.one(job.scene.source_of("K"), "matrices", "others", allowed)
     if job.plugin:
         return [result for some in solve_isolated(job, numbers) for result in some]
     if job.key not in _sessions:
+        refuse_other_matrices(job)
         _sessions.clear()
         _sessions[job.key] = session_of(job)
     session = _sessions[job.key]

@@ -90,7 +90,7 @@ class SeriesOptions:
 class Job(SeriesOptions):
     """The cases of a series, and how they are solved.
 
-    threads : None: as they are. scene_key : that of the scene where its files were read; "": not told.
+    threads : None: as they are. scene_key : that of the scene at the beginning; "": not told.
     """
 
     scene: Scene

@@ -135,7 +135,7 @@ def test_a_worker_with_other_matrices_is_refused(tmp_path: Path) -> None:
     with np.load(path) as saved:
         arrays = dict(saved)
     np.savez(path, **arrays | {"K": 2 * arrays["K"]})
-    with pytest.raises(InputError, match="copy the files to this worker"):
+    with pytest.raises(InputError, match="or are others on this worker"):
         solve_on_worker((replace(job, key="another"), [0]))
 
 
