@@ -197,7 +197,7 @@ def test_an_orphan_that_is_in_no_list_yet_is_killed_too(monkeypatch: pytest.Monk
 
 
 def test_another_scene_than_that_of_the_reference_is_refused(folder: Path) -> None:
-    """It has changed meanwhile, or is an older one on a worker: right answers would be judged as wrong ones."""
+    """It has changed meanwhile, or is older on a worker: right answers would be judged as wrong ones."""
     entry = SolverEntry(name="gi")
     suite = Suite(name="s", scenes=["tiny"], solver=[entry])
     asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
