@@ -109,9 +109,10 @@ def texts_of(path: Path) -> list[str]:
 def _kind(archive: Any, name: str) -> str:
     """The kind of an array's entries; "" if it has no dimension, or holds objects."""
     try:
-        return archive[name].dtype.kind if archive[name].ndim else ""
+        array = archive[name]
     except ValueError:  # of objects
         return ""
+    return array.dtype.kind if array.ndim else ""
 
 
 def _refuse_damaged(name: str, M: Any) -> None:
