@@ -82,7 +82,6 @@ FORMATS = {
         (".mtx",),
         matrix_text.write_matrix_market,
         matrix_text.read_matrix_market,
-        matrix_text.is_matrix_market,
         is_folder=True,
     ),
     "npz": Format("a file .npz, bit for bit", (".npz",), _write_npz, _read_npz),

@@ -7,7 +7,7 @@ effect that acts on contacts and adds to the gap derives from two: `class Shims(
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +21,10 @@ from .interface import AnyJoint
 from .joint import Faults, Pair, Table
 from .plate import Plate
 
+N = TypeVar("N")
+L = TypeVar("L")
+#: A number N, or a list L of numbers.
+OneOr = Annotated[Annotated[N, Tag(NUMBER)] | Annotated[L, Tag(NUMBERS)], Discriminator(is_list)]
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
 
@@ -277,16 +281,9 @@ class SpringEffect(ForceEffect):
         N, of all springs or of those at each point.
     """
 
-    approach: Annotated[
-        Annotated[Finite, Tag(NUMBER)] | Annotated[tuple[Finite, ...], Tag(NUMBERS)],
-        Discriminator(is_list),
-        "mm",
-    ] = 0.0
+    approach: Annotated[OneOr[Finite, tuple[Finite, ...]], "mm"] = 0.0
     preload: Annotated[
-        Annotated[NotNegative, Tag(NUMBER)] | Annotated[tuple[NotNegative, ...], Tag(NUMBERS)],
-        Discriminator(is_list),
-        Field(exclude_if=lambda force: force == 0),
-        "N",
+        OneOr[NotNegative, tuple[NotNegative, ...]], Field(exclude_if=lambda force: force == 0), "N"
     ] = 0.0
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
