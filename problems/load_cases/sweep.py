@@ -223,7 +223,7 @@ def _numbers(table: dict[str, Any]) -> list[tuple[str, ...]]:
     for key, value in table.items():
         if isinstance(value, dict):
             paths += [(key, *path) for path in _numbers(value)]
-        elif isinstance(value, int | float):
+        elif isinstance(value, int | float) and not isinstance(value, bool):
             paths.append((key,))
     return paths
 
