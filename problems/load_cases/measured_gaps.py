@@ -11,7 +11,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import regular_file
-from problems.input.matrix_files import damage
+from problems.input.matrix_files import reading
 from problems.input.scan_points import neighbours, outliers
 from problems.input.tables import AS_NAMED, TableOptions
 from problems.model.interface import AnyJoint
@@ -161,7 +161,7 @@ def _refuse_infinite(path: Path, gaps: Matrix) -> None:
 
 
 def _read(path: Path, suffix: str, m: int, options: TableOptions, labels: Sequence[int]) -> Matrix:
-    try:
+    with reading(path, "file", "a readable table of numbers"):
         match suffix:
             case ".csv":
                 return read_gaps(path, m, TABLE_MIB, options, labels)
@@ -176,7 +176,3 @@ def _read(path: Path, suffix: str, m: int, options: TableOptions, labels: Sequen
         if gaps.dtype.kind not in "fiu":
             raise ValueError(f"an array of {gaps.dtype}")
         return gaps
-    except InputError:
-        raise
-    except Exception as error:  # numpy and zipfile raise kinds of their own
-        raise InputError.one(path, "file", damage(error), "a readable table of numbers") from error
