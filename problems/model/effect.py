@@ -70,10 +70,6 @@ class Effect(Table):
         """The contacts (a, b) that this effect adds to the joint."""
         return ()
 
-    def parts(self, joint: AnyJoint) -> tuple[str, ...]:
-        """The names of the parts on which the effect acts."""
-        return joint.names
-
     def marks(self, joint: AnyJoint) -> Matrix:
         """The points that pictures of the junction mark for this effect.
 
@@ -121,9 +117,6 @@ class PartEffect(Effect):
 
     part: str
 
-    def parts(self, joint: AnyJoint) -> tuple[str, ...]:
-        return (self.part,)
-
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         yield from unknown_part(self.part, joint)
@@ -139,6 +132,7 @@ class ContactEffect(Effect):
         return joint.pairs if self.between is None else (self.between,)
 
     def parts(self, joint: AnyJoint) -> tuple[str, ...]:
+        """The names of the parts on which the effect acts."""
         named = (part for pair in self.pairs(joint) for part in pair)
         return tuple(dict.fromkeys(part for part in named if part in joint.names))
 
