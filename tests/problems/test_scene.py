@@ -130,6 +130,7 @@ BAD = [
     (("lines = [60.0]", "lines = [90.5]"), "effect[2] (ribs).lines[0]", 90.5, "0 … 90"),
     (('part = "a"', 'part = "c"'), "effect[2] (ribs).part", "c", "['a']"),
     (("I = 2e3", "I = 2e3\nJ = inf"), "effect[2] (ribs).J", float("inf"), "finite"),
+    (('[["a", "tool"]]', "[]"), "contacts", [], "at least 1 item"),
     (('[["a", "tool"]]', '[["a", "b"]]'), "contacts", ["a", "b"], "two different parts"),
     (('contacts = [["a", "tool"]]\n', ""), "effect[0] (initial_gap).between", None, "needs a contact"),
     (('[["a", "tool"]]', '[["a", "tool"], ["a", "tool"]]'), "contacts", None, "no pair twice"),
