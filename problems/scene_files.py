@@ -76,8 +76,10 @@ def read_scene(name_or_path: str) -> Scene:
     table = read_toml(path)
     is_users = not resolved(path).is_relative_to(SCENES)
     name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()
-    sources = tuple(file.absolute() for file in _files_of(path, table))
-    return replace(_scene(name, path, table), sources=sources)
+    files, assembly = _files_of(path, table), path.parent / str(table.get("assembly", "."))
+    scene = _scene(name, path, table)
+    files += _files_of(assembly, read_toml(assembly)) if isfile(assembly) else []
+    return replace(scene, sources=tuple(dict.fromkeys(file.absolute() for file in files)))
 
 
 def scene_of(table: Mapping[str, Any], name: str = "scene") -> Scene:
@@ -118,7 +120,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def _files_of(path: Path, table: dict[str, Any]) -> list[Path]:
-    """The file of a scene, and the files that its table names."""
+    """The file of a scene or an assembly, and the files that its table names."""
     queue, named = [*table.values()], [path]
     while queue:
         match queue.pop():

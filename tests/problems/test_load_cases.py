@@ -118,17 +118,16 @@ def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
     np.testing.assert_array_equal(case.f, np.load(tmp_path / "own.npz", data)["f"])
 
 
-@pytest.mark.parametrize(("kind", "mark"), [(float, 9999), (np.float32, 1e36)])
-def test_a_mark_of_own_matrices_is_no_gap(kind: type, mark: float, tmp_path: Path) -> None:
-    """Without places no other gap takes its place. In single precision 1e36 is not 1e36."""
+def test_a_mark_of_own_matrices_is_no_gap(tmp_path: Path) -> None:
+    """Without places no other gap takes its place."""
     import tiny_joint
 
     own_scene = read_scene(str(tiny_joint.write_problem(tmp_path / "own.npz")))
-    gaps = np.full((2, 10), 0.25, kind)
-    gaps[1, 3] = mark
+    gaps = np.full((2, 10), 0.25)
+    gaps[1, 3] = 9999
     np.save(tmp_path / "gaps.npy", gaps)
     with pytest.raises(InputError, match="case 1, contact 3 = nan"):
-        measured_gaps(own_scene, tmp_path / "gaps.npy", options=TableOptions(missing=(mark,)))
+        measured_gaps(own_scene, tmp_path / "gaps.npy", options=TableOptions(missing=(9999,)))
 
 
 @pytest.mark.parametrize("kind", ["csv", "npz", "npy"])
