@@ -11,7 +11,7 @@ from synthetic_series import CASES, M, made
 
 from harness.results import series_file
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
-from report.writers.series_report import _swept, write
+from report.writers.series_report import _sheet, _swept, write
 from report.writers.sheet import Sheet
 
 
@@ -85,6 +85,17 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         cases = series.cases.assign(**own)
         figure = _swept(replace(series, cases=cases), "initial_gap.mean")
         assert ("initial_gap.mean changes neither" in figure.caption) is said
+
+
+def test_one_unknown_error_leaves_the_exactness_untold(tmp_path: Path) -> None:
+    """Though all others are proven: an infinite error is null in the file, and NaN here."""
+    made(tmp_path)
+    series = read(tmp_path)
+    errors = np.full(len(series.cases), 1e-9)
+    for first, said in ((1e-9, "is exact to"), (np.nan, "could not be shown")):
+        errors[0] = first
+        cases = series.cases.assign(gap_error_mm=errors)
+        assert said in _sheet(replace(series, cases=cases), tmp_path, tmp_path).sure[0]
 
 
 @pytest.mark.usefixtures("without_pictures")

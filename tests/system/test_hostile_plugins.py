@@ -93,6 +93,17 @@ def test_no_thread_or_fork_is_left_behind(tmp_path: Path) -> None:
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
+@pytest.mark.usefixtures("own_cache")
+def test_a_solver_that_goes_to_another_folder_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plugin, suite = write(tmp_path, in_solve="os.chdir('/')"), tiny_joint.write_suite(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", "out")
+    assert done.exit_code == 0, done.output
+    assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
+
+
 def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
     with pytest.raises(InputError, match="solver mine: forms"):
