@@ -117,7 +117,7 @@ def test_an_answer_to_unproven_approaches_is_not_proven(
 ) -> None:
     """What the second stage locks is known to a millimetre; its own gaps are proven."""
     (tmp_path / "scene.toml").write_text(staged(path))
-    explorer = Explorer(scene_of(tmp_path / "scene.toml"))
+    explorer = Explorer(scene_at(tmp_path / "scene.toml"))
     first = explorer.sessions[0]
     proven = first.proven
     monkeypatch.setattr(first, "proven", lambda *of: (*proven(*of)[:3], 1.0))
