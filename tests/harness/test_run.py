@@ -1,4 +1,4 @@
-"""A run from a suite to rows, answers, report and gate, through real workers on a tiny scene; and a row of it
+"""A run from a suite to rows, answers and gate, through real workers on a tiny scene; and a row of it
 measured again, `run DIR --key KEY`.
 """
 
