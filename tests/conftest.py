@@ -39,12 +39,14 @@ def _git(*arguments: str) -> str | None:
 @pytest.fixture(autouse=True, scope="session")
 def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """One for all processes of pytest-xdist, so that an assembly is built once."""
+    gc.freeze()  # what has been imported is no garbage
     folder = tmp_path_factory.getbasetemp()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
         patch.setattr(provenance, "_git", _git)
         patch.setattr(provenance, "version", cache(provenance.version))
+        patch.setattr(provenance, "_blas", cache(provenance._blas))
         patch.setattr("typer.testing._get_command", cache(get_command))
         yield
 
@@ -75,9 +77,9 @@ def without_pictures(blank_pictures: None, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.fixture
 def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A series writes its rows and gaps alone, a run its rows and answers."""
-    for writer in ("series_report", "suite_report"):
-        monkeypatch.setattr(f"report.writers.{writer}.write", lambda directory: directory)
+    """A series writes its rows and gaps alone, a run its rows and answers, a search its plans."""
+    for kind in ("series", "suite", "place", "shim"):
+        monkeypatch.setattr(f"report.writers.{kind}_report.write", lambda directory: directory)
 
 
 @pytest.fixture(scope="session")

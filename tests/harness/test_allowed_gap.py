@@ -182,6 +182,7 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     assert (unjudged.exit_code, f"{CASES} cannot be judged" in unjudged.stdout) == (4, True)
 
 
+@pytest.mark.usefixtures("without_report")
 def test_a_case_without_an_answer_is_in_the_verdict(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     """It cannot pass; what the others show is said all the same."""
     command = ("series", gap[0], "--cases", CASES, "--check", 0, "--threads", 1, "--out", tmp_path)
@@ -205,6 +206,7 @@ def test_a_case_without_an_answer_is_in_the_verdict(gap: tuple[Path, np.ndarray]
     assert f"FAIL: the gap is larger than 0.001 mm in {CASES - 1} of {CASES} cases" in done.stdout
 
 
+@pytest.mark.usefixtures("without_report")
 def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     swept = ("--sweep", "initial_gap.mean=0.1,0.2", "--check", 0, "--threads", 1, "--allow-gap", 9.0)
     done = harness("series", gap[0], *swept, "--out", tmp_path)
@@ -212,6 +214,7 @@ def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: 
     assert "Surely within 9 mm: 2 of 2 cases.\n" in done.stdout
 
 
+@pytest.mark.usefixtures("without_report")
 def test_a_series_without_errors_of_gaps_cannot_be_told(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     command = ("series", gap[0], "--cases", 3, "--check", 0, "--threads", 1, "--out", tmp_path)
     assert harness(*command).exit_code == 0

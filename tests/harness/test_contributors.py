@@ -142,7 +142,6 @@ def test_what_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     few = moving & peaked
     assert moving.sum() > few.sum() > 0
     assert (np.isnan(shares) == few).all()
-    assert contributors_of(done)
     (left_out,) = contributors_of(replace(done, cases=done.cases[1:]))
     assert isinstance(left_out, Text)
     assert "left out: 1 of 64 cases without an answer" in left_out.markdown

@@ -57,6 +57,7 @@ def test_an_answer_replaces_no_file_that_its_scene_names(tmp_path: Path) -> None
         ("series strip.toml --cases 1", "report/scan.csv"),
         ("series strip.toml --cases 1", "allowed-gap.csv"),
         ("place strip.toml --count 1 --cases 2 --share 1", "report/scan.csv"),
+        ("place strip.toml --count 1 --cases 2 --share 1", "plan/scan.csv"),
         ("tolerance strip.toml --key initial_gap.mean --range 0.1:0.2 --allow-gap 1", "shares.csv"),
         ("solve strip.toml", "nodes.csv"),
         ("solve strip.toml strip.toml", "contacts.csv"),

@@ -1,4 +1,4 @@
-"""A run from a suite to rows, answers, report and gate, through real workers on a tiny scene; and a row of it
+"""A run from a suite to rows, answers and gate, through real workers on a tiny scene; and a row of it
 measured again, `run DIR --key KEY`.
 """
 
@@ -27,7 +27,7 @@ from harness.results.records import Row
 from problems.errors import InputError
 from studies.smaller_results import pack
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
 CONTRACT = {
     "suite", "scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeat",

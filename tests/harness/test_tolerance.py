@@ -49,7 +49,7 @@ def counts(path: Path, key: str, values: Sequence[float]) -> list[int]:
 
 
 @pytest.mark.usefixtures("without_pictures")
-@pytest.mark.parametrize(("key", "low", "high", "size"), [(SD, 0.02, 0.5, 50), (FORCE, 1.0, 600.0, 7)])
+@pytest.mark.parametrize(("key", "low", "high", "size"), [(SD, 0.02, 0.5, 8), (FORCE, 1.0, 600.0, 7)])
 def test_the_value_is_that_of_a_grid(tmp_path: Path, key: str, low: float, high: float, size: int) -> None:
     """The largest scatter by one command, the least force by the other."""
     path, out, least = write_strip(tmp_path), tmp_path / "out", 9
@@ -87,6 +87,7 @@ def test_the_value_is_that_of_a_grid(tmp_path: Path, key: str, low: float, high:
         assert answer["interval"][0] == max(sure)
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(("limit", "code", "said"), [(1e-3, 4, "Neither end keeps"), (9.0, 0, "Both ends")])
 def test_the_ends_must_differ(tmp_path: Path, limit: float, code: int, said: str) -> None:
     words = "--key", SD, "--range", "0.1:0.2", "--allow-gap", limit, "--cases", 3
@@ -105,6 +106,7 @@ def test_the_name_of_a_scene_is_no_markup(tmp_path: Path) -> None:
     assert report.startswith(f"# {SD} in a\\$x\\_\\$ \\*b\\*\n")
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_key_may_change_the_stiffness(tmp_path: Path) -> None:
     """Its series is that of a scene with the value."""
     cases = GapCases(count=3)
@@ -164,6 +166,7 @@ def test_bisection_finds_the_limit_and_its_interval() -> None:
         assert len(set(asked)) <= 2 + 3 * np.ceil(np.log2(size + 1))
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Half-way to the end of its interval where the share is surely kept, until they do not."""
     count = 100
