@@ -59,10 +59,6 @@ class Results:
         return str(self.suite.get("title") or "Results")
 
     @property
-    def sizes(self) -> list[int]:
-        return sorted({int(n) for n in self.cells["n"].dropna()})
-
-    @property
     def limit(self) -> str:
         """The accuracy required, as text: '1e-7 mm'."""
         limits = sorted(self.rows["limit_asked_mm"].dropna().unique())

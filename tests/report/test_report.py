@@ -50,6 +50,12 @@ def tiny(tmp_path: Path) -> Path:
     )
 
 
+def test_a_size_whose_forms_no_solver_takes_has_no_seconds(tmp_path: Path) -> None:
+    rows = [row(), row("6112/0100", "highs", "primal", **no_answer("unsupported"))]
+    headings = [column.heading for column in table(summary(results(tmp_path, rows))).columns]
+    assert [heading for heading in headings if "n = " in heading] == ["s per load case, n = 4386"]
+
+
 def test_standings_of_a_tiny_run(tiny: Path) -> None:
     lines = standings(read(tiny).cells).set_index("method")
     assert lines.index.tolist() == ["a (dual)", "b (primal)", "c (dual)", "d (dual)"]
