@@ -52,7 +52,7 @@ def _sheet(record: dict[str, Any], title: str, directory: Path) -> Sheet:
     solved = read_series(directory / ("plan" if best else "own"))
     facts = _summary(record).data.set_index("what")["value"]
     samples = [f"{name}: {text}." for name, text in facts.items() if ", round" in str(name)]
-    sure = [exactness(float(solved.cases["gap_error_mm"].max())), *samples, MESH]
+    sure = [exactness(solved.cases["gap_error_mm"].max(skipna=False)), *samples, MESH]
     picture = directory / "report" / "before-and-after.png"
     about = origin(record), record.get("inputs", {}), [picture] if picture.exists() else []
     tables = [block for block in _order(record) if isinstance(block, Table)] if record["order"] else []

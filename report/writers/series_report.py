@@ -70,7 +70,7 @@ def write(directory: Path) -> Path:
 def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
     facts, check = series.facts, series.facts.get("allowed_gap") or {"kind": "", "said": []}
     *sure, verdict = check["said"] or [f"The largest gap left is {_largest(series)}."]
-    sure = [exactness(float(series.cases["gap_error_mm"].max())), *sure, MESH]
+    sure = [exactness(series.cases["gap_error_mm"].max(skipna=False)), *sure, MESH]
     allowed = [directory / "allowed-gap.png"] if check["said"] else []
     pictures = [*allowed, target / "worst-case.png", target / "quantile-maps.png"]
     record = facts | {
@@ -188,7 +188,7 @@ def _swept(series: Series, key: str) -> Figure:
     axes.set(xlabel=key, ylabel="remaining gap, mm")
     drawing.legend(loc="outside right upper")
     caption = f"*The largest and the mean gap per case against {key}*, shaded: the range over the other keys."
-    error = 2 * series.cases["gap_error_mm"].astype(float).max()  # NaN if one is unknown
+    error = 2 * series.cases["gap_error_mm"].astype(float).max(skipna=False)  # NaN if one is unknown
     if np.ptp(ranges[[f"{name}_{end}" for name in GAPS for end in ("min", "max")]], axis=0).max() <= error:
         caption += (
             f" **{key} changes neither**, to what is proven: closed contacts carry the difference, or it "

@@ -11,7 +11,7 @@ from synthetic_series import CASES, M, made
 
 from harness.results import series_file
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
-from report.writers.series_report import _swept, write
+from report.writers.series_report import _sheet, _swept, write
 from report.writers.sheet import Sheet
 
 
@@ -80,6 +80,7 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         (3e-13, 1e-12, True),
         (1e-9, 1e-12, False),
         (0.0, None, False),
+        (0.0, np.where(values > 0, 1e-12, np.nan), False),
     ):
         own = {"max_gap_mm": 0.04 + moved * values, "mean_gap_mm": 0.01, "gap_error_mm": error}
         cases = series.cases.assign(**own)
@@ -113,6 +114,14 @@ def test_the_sheet_has_no_map_of_an_earlier_verdict(tmp_path: Path, monkeypatch:
         series_file.write_fact(tmp_path, "series", json.dumps(facts | more))
         write(tmp_path)
     assert [sheet.pictures[0].name for sheet in sheets] == ["worst-case.png", "allowed-gap.png"]
+
+
+def test_the_sheet_promises_nothing_if_the_error_of_one_case_is_unknown(tmp_path: Path) -> None:
+    made(tmp_path)
+    series = read(tmp_path)
+    errors = np.where(series.cases["case"] > 0, 1e-9, np.nan)
+    sheet = _sheet(replace(series, cases=series.cases.assign(gap_error_mm=errors)), tmp_path, tmp_path)
+    assert sheet.sure[0] == "How exact the calculation is could not be shown."
 
 
 @pytest.mark.usefixtures("without_pictures")
