@@ -86,21 +86,12 @@ def run_data(results: Results) -> Data:
     limits = cells["limit_asked_mm"].dropna().mode()
     limit_mm = float(limits.iloc[0]) if len(limits) else LIMIT_MM
     ladders = [scene for scene in scenes if scene["ladder"]]
-    method_of = dict(zip(cells["label"], cells["method"], strict=True))
-    methods = list(dict.fromkeys(method_of[label] for label in (in_order(cells) if len(cells) else [])))
+    methods = in_order(cells, "method") if len(cells) else []
     filters = row_filters(cells)
-    views = {
-        "matrix": "Matrix",
-        "precision": "Work and precision",
-        "solver": "One solver",
-        "maps": "Gap maps",
-    }
-    if ladders:
-        views = {"ladders": "Ladders"} | views
-    if not maps["maps"]:
-        del views["maps"]
-    if not methods:
-        del views["solver"]
+    views = {"ladders": "Ladders"} if ladders else {}
+    views |= {"matrix": "Matrix", "precision": "Work and precision"}
+    views |= {"solver": "One solver"} if methods else {}
+    views |= {"maps": "Gap maps"} if maps["maps"] else {}
     ranges = [_range(cells, ["reached_mm"]), _range(cells, ["load_case_s", "total_s", "scene_s"])]
     figures = {
         "map": map_item(hover_names(maps)),
