@@ -4,7 +4,6 @@ Modules that are slow to import are imported inside the commands.
 """
 
 import gc
-import signal
 import sys
 from collections.abc import Callable
 from io import TextIOWrapper
@@ -18,7 +17,7 @@ from harness.terminal.docstrings import docstring
 from .compare import compare, merge
 from .exchange import export, import_, judge
 from .explore import explore
-from .options import NOTHING_WRITTEN, MemoryLimit, Plugin, error_reporting, option
+from .options import NOTHING_WRITTEN, MemoryLimit, Plugin, error_reporting, option, resumable
 from .place import place
 from .scene import init, solve, validate
 from .series import series
@@ -88,13 +87,12 @@ def check(
     \b
     Exit codes: 0 nothing found, 1 faults found, 2 wrong usage or bad input.
     """
-    with error_reporting(interrupted="Interrupted.") as console:
+    with resumable(interrupted="Interrupted.") as console:
         from harness.conformance.isolated import run as run_checks
         from problems.errors import InputError
         from solvers.plugin import unused
         from solvers.registry import modules
 
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         names = solver or ([plugin.stem] if plugin else list(modules()))
         if faults := unused(plugin, names):
             raise InputError(faults)

@@ -15,7 +15,6 @@ from harness.results.row_validation import refuse_unreadable
 from harness.results.schema import SERIES
 from harness.results.series_file import refuse_damaged
 from harness.terminal.console import console_of
-from problems.errors import InputError
 from problems.reporter import SILENT, Reporter
 
 AS_IT_IS = Overrides()
@@ -140,9 +139,6 @@ def report(directory: str | Path) -> Path:
 
         refuse_damaged(directory)
         return write_series(directory)
-    path = directory / MEASUREMENTS
-    if not path.is_file():
-        raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
     refuse_unreadable(directory)
     if (directory / SUITE).is_file():
         read_written(directory / SUITE)

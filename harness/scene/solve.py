@@ -85,7 +85,9 @@ def solve_into(
     verdicts = [record["verdict"], *(stage.judgement.verdict for stage in solution.stages)]
     code = DONE if set(verdicts) == {"within"} else FAILED
     if allow_gap_mm is not None:
-        allowed_gap.check_stages(solution.stages, allow_gap_mm, record.get("stages", []))
+        for stage, line in zip(solution.stages, record.get("stages", ()), strict=True):
+            check = allowed_gap.checked(allow_gap_mm, stage.gap, stage.gap_error_mm, [])
+            line["exceeded"] = check["exceeded"]
         record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
     if allow_gap_mm is not None or stressed or solution.stages:
         from report.page.answer_page_data import (

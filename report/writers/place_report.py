@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import coordinate, counted, out_of, significant, whole
+from report.document.numbers import coordinate, counted, out_of, raised, significant, whole
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.results.series_results import read as read_series
@@ -99,7 +99,8 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
             most = plans[plans["fasteners"] == plans["fasteners"].max()]
             line = (kept if len(kept) else most).iloc[0]
             lines.append({"family": text, **line[["fasteners", "gap_mm"]], "kept": line["gap_mm"] <= limit})
-    columns = [word("plan", "family"), number("fasteners", "fasteners", whole), number("gap, mm", "gap_mm")]
+    columns = [word("plan", "family"), number("fasteners", "fasteners", whole)]
+    columns.append(number("gap, mm", "gap_mm", lambda gap: significant(raised(gap))))
     if record["limit_mm"] is not None:
         columns.append(Column("within the limit", lambda line: "yes" if line["kept"] else "no", "left"))
     caption = (

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from clopper_pearson import interval_of
 from commands import harness
 from scipy.stats import binom, binomtest
 from small_joints import FASTENERS, GAP, INLINE, two_parts
@@ -25,7 +26,7 @@ from harness import place as place_fasteners
 from harness.placement import search as search_module
 from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, uniform_plans
-from harness.placement.fresh_cases import Cases, Goal, search_in_rounds
+from harness.placement.fresh_cases import Cases, Goal, Sample, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question, answer
 from harness.planning.form_choice import Choice
@@ -251,6 +252,15 @@ def test_a_plan_that_fresh_cases_refute_is_searched_again(strip: Path) -> None:
     none = search_in_rounds(few, (), goal, Cases.of(60, False, goal))
     assert (none.best, len(none.samples)) == (None, 1)
     assert len(told_by.sentences) == 1
+
+
+def test_a_case_of_which_nothing_is_proven_neither_keeps_the_limit_nor_fails(strip: Path) -> None:
+    """Of twenty cases one leaves more, and one is not proven: it counts at one end of the interval only."""
+    gaps = {0: float("inf"), 1: 1.0}
+    search = told(strip, plans_of(strip, 1, 4), lambda _, case: gaps.get(case, 0.1))
+    sample = Sample.of((), search, Goal(0.5, 0.5), Cases(range(20), 20), slice(0, 20), 0.05)
+    assert sample.kept == 18
+    assert sample.interval == pytest.approx((interval_of(18, 20)[0], interval_of(19, 20)[1]))
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])

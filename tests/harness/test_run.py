@@ -23,9 +23,9 @@ from harness.measurement.suite_run import run
 from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite, read_written
 from harness.results import records
-from harness.results.answer_files import pack
 from harness.results.records import Row
 from problems.errors import InputError
+from studies.smaller_results import pack
 
 pytestmark = pytest.mark.slow
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from clopper_pearson import interval_of
 from commands import harness
-from scipy.stats import beta
 from small_joints import FASTENERS, GAP, INLINE, JOINT, PART, make_joint, two_parts, with_gap
 from superelements import flat, scene_from, write_part
 
@@ -313,18 +313,12 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
     for cases in (Listed((bare,) * count), gaps):
         study: Any = SimpleNamespace(cases=cases)
         *_, words, passed = each_joint(journal, study, Goal(limit, share), STOCK, SILENT)  # type: ignore[arg-type]
-        low = np.nan_to_num(proportion(count - failing, count)[0])
+        low, _ = interval_of(count - failing, count)
         needed = 1 - failing / count if cases is gaps or share == 1 else low
         assert passed == (needed >= share)
         assert f"interval {100 * low:.1f} to " in words
         assert ("no shim is needed" in words) == (not failing)
         assert ("needs a shim" in words) == (0 < failing < count)
-
-
-def proportion(kept: int, count: int) -> tuple[float, float]:
-    """The interval of Clopper and Pearson by quantiles of beta distributions."""
-    low = float(beta.ppf(0.025, kept, count - kept + 1))
-    return low, 1.0 if kept == count else float(beta.ppf(0.975, kept + 1, count - kept))
 
 
 def test_stocks_are_lists_or_steps() -> None:

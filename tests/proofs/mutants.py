@@ -304,6 +304,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "binom.cdf(c, n, q) <= alpha / 2": ("binom.cdf(c, n, q) <= alpha",),
         "cases, 1 - self.share) <= alpha / 2": ("cases, 1 - self.share) <= alpha",),
         "ALPHA / 2 ** (len(samples) + 1)": ("ALPHA / 2",),
+        "count - len(known)": ("0",),
     },
     "harness/series/derivatives.py": {
         " - dg[C]": ("",),

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from report.document.blocks import Table, number, word
-from report.document.numbers import coordinate, extent, position, raised, significant, upwards
+from report.document.numbers import coordinate, extent, position, raised, rounded_up, significant, upwards
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.page.answer_page_data import headline
@@ -192,8 +192,9 @@ def test_no_bound_is_rounded_down_or_far() -> None:
         for digits in range(1, 5):
             for said in (upwards(bound, digits), significant(raised(bound, digits), digits)):
                 assert bound <= float(said) <= bound * (1 + 1.001 * 10.0 ** (1 - digits))
+        assert bound <= float(rounded_up(bound)) <= bound * 1.01001
     assert exactness(1.241e-3) == "The calculation is exact to 0.0013 mm for this model."
-    assert (raised(None), raised(np.inf)) == (None, None)
+    assert (raised(None), raised(np.inf), rounded_up(np.inf)) == (None, None, "inf")
 
 
 def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:
