@@ -44,7 +44,7 @@ def stage_seconds(results: Results) -> pd.DataFrame:
     facts = {problem.get("scene"): problem for problem in records(results.problems)}
     built = [_built(cell, facts.get(cell["scene"], {})) for cell in records(cells)]
     lines = cells.assign(**{name: [stages[name] for stages in built] for name in built[0]})
-    lines["solving_s"] = lines[["setup_s", "solve_s"]].sum(axis=1)
+    lines["solving_s"] = lines["setup_s"].fillna(0.0) + lines["solve_s"]
     lines["recovery_s"] = lines["form_s"].fillna(0.0)
     stages = lines[list(STAGES)]
     first = stages.sum(axis=1, skipna=False).where(lines["verdict"] == "within")

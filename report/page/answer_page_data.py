@@ -41,7 +41,9 @@ def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
 def stage_lines(record: Data, arrays: dict[str, Array]) -> list[list[str]]:
     """The headings and the lines of the table of the stages; without stages, no line."""
     table = stages(record, arrays)
-    shown = table.map(lambda value: significant(value) if isinstance(value, float) else str(value))
+    shown = table.map(
+        lambda value: significant(value) if value is None or isinstance(value, float) else str(value)
+    )
     heads = [name.replace("_mm", " gap, mm") for name in shown.columns]
     return [heads, *shown.to_numpy().tolist()]
 
