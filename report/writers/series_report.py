@@ -131,11 +131,8 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
         return []
     case = int(series.cases["case"].iloc[series.cases["max_gap_mm"].to_numpy().argmax()])
     gap = np.asarray(series.gaps[case], dtype=float)
-    places = pd.DataFrame({"x_mm": nodes[:, 0], "y_mm": nodes[:, 1]})
-    values = {
-        **{f"q{q:g}_mm": values for q, values in zip(QUANTILES, maps, strict=False)},
-        "mean_mm": maps[-1],
-    }
+    places = pd.DataFrame(nodes[:, :2], columns=["x_mm", "y_mm"])
+    values = dict(zip([*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"], maps, strict=True))
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
     quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
     limit = larger_than((series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf), gap)
