@@ -14,8 +14,7 @@ from report.document.numbers import (
     upwards,
     without_rounding,
 )
-from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
-from report.page.page_figures import map_item
+from report.page.contact_maps import answer_maps, map_view, two_answers_maps
 from report.page.page_file import Data, banner, table_data
 from report.results.answer_record import SavedAnswer, fasteners, pair_name, stages
 from report.results.series_results import Array
@@ -134,11 +133,7 @@ def _with_maps(records: list[Data], lines: list[list[str]], maps: Data) -> Data:
             for title, some in tables.items()
             if some
         ],
-        "views": [("maps", "Gap maps")] if maps["maps"] else [],
-        "controls": map_controls(maps),
-        "maps": maps,
-        "figures": {"map": map_item(hover_names(maps))},
-    }
+    } | map_view(maps)
 
 
 def _banner(records: list[Data]) -> Data:

@@ -11,6 +11,7 @@ import numpy as np
 
 from report.document.numbers import ROUNDING, counted
 from report.figures.node_cells import cells_of
+from report.page.page_figures import map_item
 from report.page.page_file import Data, choice, entry, exact, packed
 from report.results.answer_record import pair_name, stress_map
 from report.results.reader import Results
@@ -155,6 +156,13 @@ def map_controls(page: Data) -> list[Data]:
         choice("scale", "colours", [("linear", "linear"), ("log", "logarithmic")], "maps"),
         *(entry(name, label, "maps") for name, label in COLOUR_ENTRIES.items()),
     ]
+
+
+def map_view(page: Data) -> Data:
+    """The view, the controls and the figure of a page that has maps alone."""
+    views = [("maps", "Gap maps")] if page["maps"] else []
+    figures = {"map": map_item(hover_names(page))}
+    return {"views": views, "controls": map_controls(page), "maps": page, "figures": figures}
 
 
 def hover_names(page: Data) -> list[str]:
