@@ -10,7 +10,9 @@ import pytest
 from synthetic_series import CASES, M, made
 
 from harness.results import series_file
+from report.document.blocks import Figure
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
+from report.writers import place_report
 from report.writers.series_report import _sheet, _swept, write
 from report.writers.sheet import Sheet
 
@@ -122,6 +124,17 @@ def test_the_sheet_promises_nothing_if_the_error_of_one_case_is_unknown(tmp_path
     errors = np.where(series.cases["case"] > 0, 1e-9, np.nan)
     sheet = _sheet(replace(series, cases=series.cases.assign(gap_error_mm=errors)), tmp_path, tmp_path)
     assert sheet.sure[0] == "How exact the calculation is could not be shown."
+
+
+def test_a_case_without_an_answer_has_the_largest_gaps_of_the_map_of_a_plan(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    gaps = made(tmp_path / "own")
+    record = {"share": 0.95, "own": [], "best": None, "samples": [], "limit_mm": None}
+    (figure,) = place_report._maps(record, tmp_path)
+    assert isinstance(figure, Figure)
+    assert figure.data is not None
+    all_cases = np.vstack([gaps, np.full(M, np.inf)])
+    np.testing.assert_allclose(figure.data["own_mm"], np.quantile(all_cases, 0.95, axis=0), rtol=1e-6)
 
 
 @pytest.mark.usefixtures("without_pictures")
