@@ -23,7 +23,7 @@ from report.document.blocks import records
 from report.document.numbers import counted, listed
 from report.figures.style import line_styles
 from report.page.contact_maps import hover_names, map_controls, scene_maps
-from report.page.page_figures import PANELS, copies, map_item, precision_figure
+from report.page.page_figures import PANELS, item, map_item, precision_figure
 from report.page.page_file import Data, banner, column
 from report.page.run_page_controls import limit_slider, row_filters, ways_to_show
 from report.results.reader import Results
@@ -93,9 +93,10 @@ def run_data(results: Results) -> Data:
     views |= {"solver": "One solver"} if methods else {}
     views |= {"maps": "Gap maps"} if maps["maps"] else {}
     ranges = [_range(cells, ["reached_mm"]), _range(cells, ["load_case_s", "total_s", "scene_s"])]
+    panel = precision_figure(*ranges)
     figures = {
         "map": map_item(hover_names(maps)),
-        "panels": copies(precision_figure(*ranges), [f"panel-{k}" for k in range(min(PANELS, len(scenes)))]),
+        "panels": [item(panel, f"panel-{k}") for k in range(min(PANELS, len(scenes)))],
     }
     return {
         "banner": _banner(results),
