@@ -16,7 +16,8 @@ from problems.model.scene import JointScene
 def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> Joint:
     data = {"length": 400.0, "width": 120.0, "nodes": (5, 4)} | junction
     part = [{"name": "a", "thickness": 6.0} | table for table in parts]
-    return Joint.model_validate({"junction": data, "part": part, "contacts": contacts})
+    given = {"contacts": contacts} if contacts else {}
+    return Joint.model_validate({"junction": data, "part": part} | given)
 
 
 #: Half of a joint, and a small joint of two of these.

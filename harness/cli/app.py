@@ -123,15 +123,17 @@ def schema(
     Example:
       python -m harness schema scene --out scene.schema.json
     """
-    with error_reporting(*NOTHING_WRITTEN):
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.planning.json_schema import schema_of
-        from harness.results.records import replace_text, to_line
+        from harness.results.atomic_output import atomic_output
+        from harness.results.records import to_line
 
-        text = to_line(schema_of(what)) + "\n"
+        text = to_line(schema_of(what))
         if out is None:
-            typer.echo(text, nl=False)
-        else:
-            replace_text(out, text)
+            console.print(text, soft_wrap=True)
+            return
+        with atomic_output(out) as new:
+            new.write_text(f"{text}\n", "utf-8")
 
 
 app.callback(help=docstring(harness))(harness)

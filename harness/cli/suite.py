@@ -182,6 +182,7 @@ def gate(
             json_file=json,
             junit_file=junit,
         )
+        code = show(outcome, console)  # said also if the page cannot be written
         if page := os.environ.get("GITHUB_STEP_SUMMARY"):
             append_summary(Path(page), outcome)
-        raise typer.Exit(show(outcome, console))
+        raise typer.Exit(code)

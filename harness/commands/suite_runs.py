@@ -100,10 +100,10 @@ def run(
         refuse_inputs([directory / SUITE], [Path(suite)])
     code = run_suite(chosen, directory, console_of(reporter), scheduler, key)
     if not (directory / MEASUREMENTS).is_file():
-        return SuiteOutcome(directory, code, None)
+        return SuiteOutcome(directory.absolute(), code, None)
     from report.writers.suite_report import write  # slow to import: not before the first row
 
-    return SuiteOutcome(directory, code, write(directory))
+    return SuiteOutcome(directory.absolute(), code, write(directory))
 
 
 def report(directory: str | Path) -> Path:

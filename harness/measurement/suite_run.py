@@ -107,7 +107,7 @@ Outcomes = Callable[
 def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Iterator[Outcomes]:
     """One measurement after another here, or one at a time on each worker of a scheduler."""
     if scheduler is None:
-        answers = directory / "answers"
+        answers = (directory / "answers").absolute()  # a solver may go to another folder
         yield lambda tasks: ((pending, run_task(task, answers)) for pending, task in filter(None, tasks))
         return
     with workers(scheduler, console) as (executor, count):
@@ -178,7 +178,7 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task(batch, self.solvers[m.solver, m.entry.label])
+            task = Task(batch, self.solvers[m.solver, m.entry.label], problem.scene.key)
             self.running[m.key] = m
             yield (task, problem), task
 

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from harness.results.comparison import Incomparable
+from harness.results.records import refuse_other_command
 from harness.terminal import FAILED
 from problems.build import prepared
 from problems.errors import read_all
@@ -24,6 +25,8 @@ from problems.model.surface import surface_of
 from problems.scene_files import read_scene
 
 FOLDERS = ["first", "second"]
+PAGE = "comparison.md"  # a folder with it has a comparison
+OUTPUTS = ("contacts.csv", "fasteners.csv", "index.html", "pairs.csv")
 SHIFT = 0.05  # of the junction's longer side, by which the corners of two meshes of it may differ
 
 
@@ -32,9 +35,10 @@ def solve_both(
 ) -> int:
     """Solve both into DIR/first and DIR/second, write DIR/comparison.md and its files, print what changed.
 
-    Returns the exit code of the second, or 1 if the first has no good answer. Raises InputError, Incomparable
-    if they are not of one junction.
+    Returns the exit code of the second, or 1 if the first has no good answer. Raises InputError, also if
+    DIR has such files of something else; Incomparable if they are not of one junction.
     """
+    refuse_other_command(out, PAGE, OUTPUTS)
     weights = common_places(*sources)
     codes = []
     for source, folder in zip(sources, FOLDERS, strict=True):

@@ -56,7 +56,8 @@ def run(
             for _, some in groupby(remaining, job.cases.stiffness_of):
                 numbers = list(some)
                 one_K = job.cases.of_stiffness(numbers[0], job.scene)
-                part = replace(job, scene=one_K[0], cases=one_K[1], key=uuid4().hex)  # another session
+                key, scene_key = uuid4().hex, one_K[0].key  # another session
+                part = replace(job, scene=one_K[0], cases=one_K[1], key=key, scene_key=scene_key)
                 with results_of(part, numbers, address, console) as results:
                     solve_remaining(part, len(numbers), results, directory, console)
         return summary(series_file.rows(directory), job.cases.count, console)

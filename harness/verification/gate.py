@@ -134,6 +134,8 @@ def gate(
     for option, factor, usual in (("--margin", margin, MARGIN), ("--max-slowdown", max_slowdown, None)):
         if factor != usual and base is None:
             raise InputError.one(option, "factor", factor, "needs --baseline DIR")
+        if factor is not None and not factor >= 1:
+            raise InputError.one(option, "factor", factor, "1 or larger")
     named = {"--json": json_file, "--junit": junit_file}
     outputs = {option: Path(file) if file else None for option, file in named.items()}
     refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])

@@ -364,6 +364,18 @@ def test_a_suite_is_a_test_set(scenes: Path, tmp_path: Path) -> None:
         assert np.array_equal(line["G"].reshape(-1, n), dense(problem.G))
 
 
+def test_two_programs_of_one_name_are_no_test_set(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        write_strip(tmp_path / folder)
+    suite = tmp_path / "two.toml"
+    suite.write_text('scenes = ["a/strip.toml", "b/strip.toml"]\n[[solver]]\nname = "gi"\n')
+    done = harness("export", suite, "--form", "dual", "--out", tmp_path / "two.parquet")
+    assert done.exit_code == 2
+    assert "scenes = ['strip']: names of their own" in done.stderr
+
+
 @pytest.mark.parametrize("name", ["p.mps", "p.parquet"])
 def test_these_files_hold_no_answer(name: str, scenes: Path, tmp_path: Path) -> None:
     words = ("--form", "dual", "--with-reference", "--out", tmp_path / name)

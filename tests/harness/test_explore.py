@@ -120,6 +120,19 @@ def test_each_stage_is_that_of_solve(
     assert abs(answer.stages[0].gap - answer.gap).max() > 0.01
 
 
+def test_an_answer_to_unproven_approaches_is_not_proven(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the second stage locks is known to a millimetre; its own gaps are proven."""
+    (tmp_path / "scene.toml").write_text(staged(path))
+    explorer = Explorer(scene_of(tmp_path / "scene.toml"))
+    first = explorer.sessions[0]
+    proven = first.proven
+    monkeypatch.setattr(first, "proven", lambda *of: (*proven(*of)[:3], 1.0))
+    stages = explorer.proven(explorer.answer(explorer.settings)).stages
+    assert np.isfinite([stage.error_mm for stage in stages]).tolist() == [True, True, False, False]
+
+
 def test_a_shifted_support_stays_in_a_scene_with_stages(path: Path, tmp_path: Path) -> None:
     """What stages set is looked at in each of them: a support that none has is still refused."""
     place = 'part = "a"\npoints = [[100.0, 70.0]]\n'

@@ -270,6 +270,23 @@ def test_times_without_repeats_or_another_solver_tell_nothing(copy: Path, finish
         assert ("in both runs: --repeat 3" if words else "needs --baseline DIR") in done.stderr
 
 
+@pytest.mark.parametrize("option", ["--margin", "--max-slowdown"])
+def test_a_factor_that_is_no_number_passes_nothing(option: str, finished: Path) -> None:
+    """Nothing is larger than NaN: every measurement passed."""
+    done = gate(finished, "--baseline", finished, option, "nan")
+    assert done.exit_code == 2
+    assert f"{option}: factor = nan: 1 or larger" in done.stderr
+
+
+def test_the_outcome_is_said_also_if_the_page_cannot_be_written(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path))  # a folder
+    done = gate(finished)
+    assert done.exit_code == 2
+    assert "Passed: all 2 gated rows" in done.stdout
+
+
 def test_the_page_of_a_job_has_the_outcome(
     copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -274,6 +274,22 @@ def test_gate_with_nothing_to_judge(copy: Path, rows_kept: str) -> None:
     assert "Nothing could be judged" in text
 
 
+@pytest.mark.usefixtures("finished")
+def test_an_answer_that_cannot_be_saved_ends_the_run(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is no failure of its solver, and is measured again by the next run."""
+
+    def measure(batch: list[Any], files: list[Path]) -> list[dict[str, Any]]:
+        return [{"status": "failed", "answer": None, "cannot_save": f"{files[0]}: no space left"}]
+
+    monkeypatch.setattr("harness.measurement.task.measure", measure)
+    done = harness("run", folder / "small.toml", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "no space left; rows already written are safe" in done.stderr
+    assert not (tmp_path / "out" / records.MEASUREMENTS).exists()
+
+
 def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path) -> None:
     messages = {
         ("gate", folder / "nowhere"): "no such directory",

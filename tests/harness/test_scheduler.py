@@ -124,6 +124,21 @@ def test_an_error_of_input_travels_from_a_worker(kind: type[InputError]) -> None
     assert (type(again), again.faults, str(again)) == (kind, error.faults, str(error))
 
 
+def test_a_worker_with_other_matrices_is_refused(tmp_path: Path) -> None:
+    """Its copy of the file is older: its answers would be to another problem."""
+    path = tiny_joint.write_problem(tmp_path / "own.npz")
+    scene = read_scene(str(path))
+    np.save(tmp_path / "gaps.npy", np.full((1, 10), 0.25))
+    cases = measured_gaps(scene, tmp_path / "gaps.npy")
+    job = Job(scene=scene, cases=cases, form="dual", check=0, scene_key=scene.key)
+    assert len(solve_on_worker((job, [0]))) == 1
+    with np.load(path) as saved:
+        arrays = dict(saved)
+    np.savez(path, **arrays | {"K": 2 * arrays["K"]})
+    with pytest.raises(InputError, match="or are others on this worker"):
+        solve_on_worker((replace(job, key="another"), [0]))
+
+
 def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not there
     with (

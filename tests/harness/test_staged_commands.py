@@ -17,6 +17,7 @@ from small_joints import two_parts
 from harness.measurement.worker import load_cases, scene_to_measure
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
+from harness.scene.answer_record import bound_shown
 from harness.scene.mesh_error import on_mesh
 from harness.scene.solution import solve
 from harness.scene.solve import solve_into
@@ -30,7 +31,7 @@ from problems.model.joint import Joint
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from report.writers import sheet
-from rivetbench import export, judge, validate
+from rivetbench import export, judge, stresses, validate
 
 EFFECTS = """
 title = "Riveted"
@@ -93,8 +94,10 @@ def test_an_answer_to_unproven_approaches_is_not_proven(
         assert problem.reference.bound_mm == np.inf
         x, lam = problem.reference.x, problem.reference.lam
         assert problem.judged(x, lam, 1e-7).verdict == "cannot_be_judged"
-        known = [np.isfinite(stage.gap_error_mm).all() for stage in solve(str(staged)).stages]
-        assert known == [True, True, False]
+        answer = solve(str(staged))
+        assert [np.isfinite(stage.gap_error_mm).all() for stage in answer.stages] == [True, True, False]
+        assert np.isinf(np.concatenate(stresses(answer).errors)).all()
+        assert bound_shown(answer) == np.inf
     proven = open_problem(read_scene(str(staged))).reference
     assert proven.bound_mm <= 1e-9
     assert solve(str(staged)).gap_error_mm.max() <= 1e-7

@@ -109,6 +109,7 @@ def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_pat
     assert fewer.loc[fewer["method"] == "b (dual)", "share"].tolist() == [0.5, 1.0]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_log_is_linked_where_it_is_one_of_the_run(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/a.txt").write_text("iter 1\n")

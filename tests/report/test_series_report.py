@@ -90,18 +90,30 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         assert ("initial_gap.mean changes neither" in figure.caption) is said
 
 
+def test_one_unknown_error_leaves_the_exactness_untold(tmp_path: Path) -> None:
+    """Though all others are proven: an infinite error is null in the file, and NaN here."""
+    made(tmp_path)
+    series = read(tmp_path)
+    errors = np.full(len(series.cases), 1e-9)
+    for first, said in ((1e-9, "is exact to"), (np.nan, "could not be shown")):
+        errors[0] = first
+        cases = series.cases.assign(gap_error_mm=errors)
+        assert said in _sheet(replace(series, cases=cases), tmp_path, tmp_path).sure[0]
+
+
 @pytest.mark.usefixtures("without_pictures")
 def test_a_report_replaces_the_files_of_the_last_and_no_other(tmp_path: Path) -> None:
-    """Even if the title of the series looks like a link to one."""
+    """Even if the title of the series looks like a link to one. Without an answer it is a summary alone."""
     made(tmp_path, name="[CSV](mine.csv)")
     target = write(tmp_path).parent
     older = {path.name for path in target.iterdir()}
     assert {"quantile-maps.png", "worst-case.csv", "sheet.pdf"} < older
     (target / "mine.csv").write_text("x,y,gap\n")
-    series_file.write_contacts(tmp_path, {"m": np.array(M)})
     series_file.append(tmp_path, [({"case": k, "verdict": "no_answer"}, None) for k in range(CASES)])
-    write(tmp_path)
+    text = write(tmp_path).read_text()
     assert {path.name for path in target.iterdir()} == {"mine.csv", "report.md", "summary.csv"}
+    assert f"{CASES} no answer" in text
+    assert text.count("## ") == 1
 
 
 def test_the_sheet_has_no_map_of_an_earlier_verdict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,14 +128,6 @@ def test_the_sheet_has_no_map_of_an_earlier_verdict(tmp_path: Path, monkeypatch:
         series_file.write_fact(tmp_path, "series", json.dumps(facts | more))
         write(tmp_path)
     assert [sheet.pictures[0].name for sheet in sheets] == ["worst-case.png", "allowed-gap.png"]
-
-
-def test_the_sheet_promises_nothing_if_the_error_of_one_case_is_unknown(tmp_path: Path) -> None:
-    made(tmp_path)
-    series = read(tmp_path)
-    errors = np.where(series.cases["case"] > 0, 1e-9, np.nan)
-    sheet = _sheet(replace(series, cases=series.cases.assign(gap_error_mm=errors)), tmp_path, tmp_path)
-    assert sheet.sure[0] == "How exact the calculation is could not be shown."
 
 
 def test_a_case_without_an_answer_has_the_largest_gaps_of_the_map_of_a_plan(tmp_path: Path) -> None:
@@ -144,11 +148,3 @@ def test_a_series_without_nodes_has_no_map(tmp_path: Path) -> None:
     text = write(tmp_path).read_text()
     assert "exceedance.png" in text
     assert "quantile-maps" not in text
-
-
-def test_a_series_without_an_answer_has_a_summary_alone(tmp_path: Path) -> None:
-    made(tmp_path)
-    series_file.append(tmp_path, [({"case": k, "verdict": "no_answer"}, None) for k in range(CASES)])
-    text = write(tmp_path).read_text()
-    assert f"{CASES} no answer" in text
-    assert text.count("## ") == 1
