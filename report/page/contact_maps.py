@@ -12,7 +12,7 @@ import numpy as np
 from report.document.numbers import ROUNDING, counted
 from report.figures.node_cells import cells_of
 from report.page.page_figures import map_item
-from report.page.page_file import Data, choice, entry, exact, packed
+from report.page.page_file import Data, choice, exact, packed
 from report.results.answer_record import pair_name, stress_map
 from report.results.reader import Results
 from report.results.series_results import Array, Series
@@ -154,7 +154,7 @@ def map_controls(page: Data) -> list[Data]:
         choice("map", "map", [(k, made["name"]) for k, made in enumerate(page["maps"])], "maps"),
         choice("field", "show", [(name, name) for name in ordered], "maps"),
         choice("scale", "colours", [("linear", "linear"), ("log", "logarithmic")], "maps"),
-        *(entry(name, label, "maps") for name, label in COLOUR_ENTRIES.items()),
+        *({"name": name, "label": label, "views": "maps"} for name, label in COLOUR_ENTRIES.items()),
     ]
 
 

@@ -61,11 +61,6 @@ def choice(name: str, label: str, options: Iterable[tuple[object, str]], views: 
     }
 
 
-def entry(name: str, label: str, views: str) -> Data:
-    """A field for a number above some views."""
-    return {"name": name, "label": label, "views": views}
-
-
 def table_data(title: str, columns: list[Column], data: pd.DataFrame, summary: str = "") -> Data:
     """The data of a table, shown as in a report."""
     lines = [[column.show(line) for column in columns] for line in records(data)]
