@@ -46,6 +46,7 @@ def solve_both(
         console.print(source, style="bold")
         codes.append(solve(source, out / folder))
     from report.document.escape import plain
+    from report.document.numbers import whole
     from report.writers.two_answers_report import write
 
     path, pairs, said = write(out, FOLDERS, weights)
@@ -54,7 +55,8 @@ def solve_both(
         console.print(
             f"{plain(str(line['contact']))}: the largest gap {line['largest_first_mm']:.4g} → "
             f"{line['largest_second_mm']:.4g} mm, mean {line['mean_first_mm']:.4g} → "
-            f"{line['mean_second_mm']:.4g} mm, closed {line['closed_first']} → {line['closed_second']}"
+            f"{line['mean_second_mm']:.4g} mm, closed {whole(line['closed_first'])} → "
+            f"{whole(line['closed_second'])}"
         )
     for sentence in said:
         console.print(plain(sentence))

@@ -139,12 +139,15 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
         names["plan"] = f"the plan of {record['best']['fasteners']}"
     for name, text in names.items():
         series = read_series(directory / name)
+        count = series.facts["cases"]
         if record["samples"]:
-            fresh = series.cases["case"].isin(record["samples"][-1]["numbers"])
-            series = replace(series, cases=series.cases[fresh])
-        if series.nodes is None or not len(series.cases):
+            numbers = record["samples"][-1]["numbers"]
+            count = len(numbers)
+            series = replace(series, cases=series.cases[series.cases["case"].isin(numbers)])
+        of_answered = share * (count - 1) / max(len(series.cases) - 1, 1)  # without an answer: the largest
+        if series.nodes is None or not len(series.cases) or of_answered > 1:
             return [Text("No picture: some cases have no answer.")]
-        pieces = [np.quantile(some, share, axis=0) for some in series.of_contacts()]
+        pieces = [np.quantile(some, of_answered, axis=0) for some in series.of_contacts()]
         shown.append((text, series.nodes, np.concatenate(pieces), series.marks))
     scale = rooted("gap, mm", "viridis", *(values for _, _, values, _ in shown))
     limit = np.inf if record["limit_mm"] is None else record["limit_mm"]

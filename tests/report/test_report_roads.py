@@ -84,6 +84,11 @@ def test_only_answers_within_the_limit_at_a_known_cost_have_a_total(tmp_path: Pa
     assert pd.isna(unknown.loc["newton (dual)", "total_1_s"])
 
 
+def test_a_run_without_an_answer_has_no_seconds_of_solving(tmp_path: Path) -> None:
+    found = lines(tmp_path, [sparse(), dense() | no_answer("time_limit")])
+    assert pd.isna(found.loc["newton (dual)", "solving_s"])
+
+
 def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
     section = from_scene(built(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
     assert len(section.blocks) == 1

@@ -10,7 +10,9 @@ import pytest
 from synthetic_series import CASES, M, made
 
 from harness.results import series_file
+from report.document.blocks import Figure
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
+from report.writers import place_report
 from report.writers.series_report import _sheet, _swept, write
 from report.writers.sheet import Sheet
 
@@ -80,6 +82,7 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         (3e-13, 1e-12, True),
         (1e-9, 1e-12, False),
         (0.0, None, False),
+        (0.0, np.where(values > 0, 1e-12, np.nan), False),
     ):
         own = {"max_gap_mm": 0.04 + moved * values, "mean_gap_mm": 0.01, "gap_error_mm": error}
         cases = series.cases.assign(**own)
@@ -125,6 +128,17 @@ def test_the_sheet_has_no_map_of_an_earlier_verdict(tmp_path: Path, monkeypatch:
         series_file.write_fact(tmp_path, "series", json.dumps(facts | more))
         write(tmp_path)
     assert [sheet.pictures[0].name for sheet in sheets] == ["worst-case.png", "allowed-gap.png"]
+
+
+def test_a_case_without_an_answer_has_the_largest_gaps_of_the_map_of_a_plan(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    gaps = made(tmp_path / "own")
+    record = {"share": 0.95, "own": [], "best": None, "samples": [], "limit_mm": None}
+    (figure,) = place_report._maps(record, tmp_path)
+    assert isinstance(figure, Figure)
+    assert figure.data is not None
+    all_cases = np.vstack([gaps, np.full(M, np.inf)])
+    np.testing.assert_allclose(figure.data["own_mm"], np.quantile(all_cases, 0.95, axis=0), rtol=1e-6)
 
 
 @pytest.mark.usefixtures("without_pictures")
