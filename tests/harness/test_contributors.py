@@ -145,6 +145,10 @@ def test_what_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     (left_out,) = contributors_of(replace(done, cases=done.cases[1:]))
     assert isinstance(left_out, Text)
     assert "left out: 1 of 64 cases without an answer" in left_out.markdown
+    unproven = done.cases.assign(gap_error_mm=done.cases["gap_error_mm"].where(done.cases["case"] > 0))
+    (left_out,) = contributors_of(replace(done, cases=unproven))
+    assert isinstance(left_out, Text)
+    assert "left out: 1 of 64 cases without a proven error" in left_out.markdown
 
 
 def test_a_series_that_grows_meanwhile_keeps_its_new_facts(
