@@ -12,6 +12,7 @@ from report.document.numbers import (
     raised,
     significant,
     upwards,
+    whole,
     without_rounding,
 )
 from report.page.contact_maps import answer_maps, map_view, two_answers_maps
@@ -43,6 +44,8 @@ def stage_lines(record: Data, arrays: dict[str, Array]) -> list[list[str]]:
     shown = table.map(
         lambda value: significant(value) if value is None or isinstance(value, float) else str(value)
     )
+    if len(table):
+        shown["closed"] = table["closed"].map(whole)  # no floats beside one that is not known
     heads = [name.replace("_mm", " gap, mm") for name in shown.columns]
     return [heads, *shown.to_numpy().tolist()]
 

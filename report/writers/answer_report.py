@@ -174,7 +174,7 @@ def write_vtu(
     since meshio is optional. grid : makes points, cells and point data; by default of those nodes.
 
     Point data: displacement (0, 0, x) in mm, to warp by; part; Aλ, the force with which the node pushes on
-    what it touches, N; the smallest gap before and after at its contacts, mm, NaN if it has none.
+    what it touches, N; the smallest gap before and after at its contacts, mm. NaN: not known, or no contact.
     """
     try:
         import meshio
@@ -201,7 +201,7 @@ def grid_with_fields(record: dict[str, Any], arrays: dict[str, Any]) -> MeshData
     nodes, n = arrays["nodes"], len(arrays["nodes"])
     force, initial, remaining = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)
     columns = np.repeat(np.arange(record["m"]), np.diff(arrays["A_indptr"]))
-    np.add.at(force, arrays["A_indices"], arrays["A_data"] * np.nan_to_num(arrays["lam"])[columns])
+    np.add.at(force, arrays["A_indices"], arrays["A_data"] * arrays["lam"][columns])
     np.fmin.at(initial, arrays["A_indices"], arrays["gap_before"][columns])
     np.fmin.at(remaining, arrays["A_indices"], arrays["gap_after"][columns])
     part = np.concatenate([np.full(p["stop"] - p["start"], k) for k, p in enumerate(record["parts"])])
