@@ -227,6 +227,9 @@ value = 1e-4
     for (_, found), share in zip(table.dropna(subset="x").groupby("x"), exact.T, strict=True):
         assert_near(found.reset_index(drop=True), share, share)
     assert table["input"].tolist() == [*sd] * 3
+    *_, said = contributors_of(replace(series, cases=series.cases.assign(force_error_N=np.nan)))
+    assert isinstance(said, Text)
+    assert "of forces are left out" in said.markdown
 
 
 def test_a_gap_that_does_not_vary_has_no_contributors(tmp_path: Path) -> None:
