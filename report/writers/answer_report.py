@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
-from report.document.numbers import extent, raised, significant, whole
+from report.document.numbers import beside, extent, raised, significant, whole
 from report.figures.answer_maps import answer_figures
 from report.figures.node_cells import grid_of
 from report.page.answer_page_data import FASTENER, FORCE, answer_data, facts, headline
@@ -149,7 +149,8 @@ def _stages(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
     if "stages" not in record:
         return []
     table = stages(record, arrays)
-    columns = [word("stage", "stage"), number("largest gap, mm", "largest_mm"), word("at", "at")]
+    shown = beside((record.get("allowed_gap") or {}).get("allowed_mm", 0.0))
+    columns = [word("stage", "stage"), number("largest gap, mm", "largest_mm", shown), word("at", "at")]
     columns += [number("closed", "closed", whole)]
     columns += [number(name, name) for name in table.columns if name.endswith(", N")]
     columns += [word("verdict", "verdict")] if "verdict" in table else []
