@@ -89,5 +89,5 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
         words += f"; in {share} it is {rounded_up(step.gap_mm)} mm"
-    more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
+    more = f"{rounded_up(step.gap_mm - goal.limit_mm)} mm more than allowed"
     return f"FAIL: {words}, {more}; case {worst} is the worst, at {at}.", False

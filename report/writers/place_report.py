@@ -179,7 +179,7 @@ def _order(record: dict[str, Any]) -> list[Block]:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     columns = [number("set", "set", whole), *([word("hole", "name")] if labels else [])]
     columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
-    columns.append(number("gap after it, mm", "gap_mm"))
+    columns.append(number("gap after it, mm", "gap_mm", lambda gap: significant(raised(gap))))
     caption = "*The order that keeps the gap small*: the reverse of removing what is needed least."
     return [
         Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),
