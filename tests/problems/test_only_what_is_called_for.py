@@ -43,7 +43,7 @@ for scene_file in scene_files:
 
 
 def imported(scenes: list[Path], cache: Path, package: Path = ROOT) -> list[set[str]]:
-    """The modules of `problems` in the folder `package` that each scene but the first needs, built into .npz."""
+    """The modules of `problems` in the folder `package` that each scene but the first needs, into .npz."""
     done = subprocess.run(
         [sys.executable, "-c", RUN, *map(str, scenes)],
         cwd=package,
