@@ -15,7 +15,7 @@ from problems.errors import InputError
 from problems.load_cases.gaps_through_scan import NOISE, Scan, square_root
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
 
-SD, LENGTH, COUNT = 0.2, 120.0, 4000
+SD, LENGTH, COUNT = 0.2, 120.0, 2000
 SCAN = np.array([[0.0, 0.0, 0.5], [130.0, 41.0, 0.9], [133.0, 44.0, 0.95], [400.0, 120.0, 0.3]])
 
 
