@@ -10,7 +10,7 @@ import pytest
 from riveted_strips import FORCE, STIFFNESS, C, Tables, approach, joint_scene, strips
 from small_joints import JOINT as PLATES
 from small_joints import make_scene, untied
-from superelements import stiffnesses, write_part
+from superelements import stiffnesses, write_part, write_plates
 
 from harness.scene.solution import solve
 from problems.build import adopts_model, load_case, prepared
@@ -160,10 +160,7 @@ def test_a_clamp_through_a_stack_counts_once_and_a_rivet_in_each_contact() -> No
 
 
 def test_superelements_go_through_the_same_stages(tmp_path: Path) -> None:
-    plates = joined(ONCE)
-    nodes = np.column_stack([plates.joint.nodes_of("a"), np.zeros(45)])
-    matrices = stiffnesses(plates.joint)  # type: ignore[arg-type]
-    parts = [write_part(tmp_path, name, K, nodes) for name, K in zip("ab", matrices, strict=True)]
+    parts = write_plates(tmp_path, joined(ONCE).joint)  # type: ignore[arg-type]
     effects = [{"kind": "initial_gap", "mean": 0.4}, *EFFECTS[1:3]]
     one, other = solve(joined(ONCE, effects)), solve(joined(ONCE, effects, {"part": parts}))
     for mine, theirs in zip(one.stages, other.stages, strict=True):
@@ -215,12 +212,6 @@ def test_stages_share_the_stiffness_that_they_have_in_common() -> None:
     assert scenes[1].model is not None
     with pytest.raises(InputError, match="no stages here"):
         prepared(joined(ONCE))
-
-
-def test_springs_have_a_key_of_their_own_in_the_sparse_form() -> None:
-    """What was proven of K without springs does not hold with them."""
-    scene = joined([])
-    assert prepared(scene, form="sparse").key != prepared(untied(scene), form="sparse").key
 
 
 def test_a_name_is_in_no_key_and_stages_are() -> None:
