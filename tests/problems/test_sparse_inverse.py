@@ -133,7 +133,8 @@ def test_without_coordinates_windows_go_along_the_bands(kind: str) -> None:
     found = Prepared(Assembly(Stiffness.of(*bodies), sp.csc_array(A))).approximate_inverse
     assert (found.M is None) == (kind == "general")
     if found.M is not None:
-        Q = A.T @ np.linalg.solve(sp.block_diag(bodies).toarray(), A.toarray())
+        sides = zip(bodies, np.split(A.toarray(), 2), strict=True)
+        Q = np.sum([B.T @ np.linalg.solve(K.toarray(), B) for K, B in sides], axis=0)
         np.testing.assert_allclose(found.diagonal, Q.diagonal(), rtol=SINGLE)
         Q = Q[np.ix_(found.M.order, found.M.order)]
         product = np.column_stack([found.M.product(column) for column in Q])

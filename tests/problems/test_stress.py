@@ -84,7 +84,7 @@ def test_a_square_plate_under_pressure_at_its_middle(clamped: bool, moment: floa
 def test_a_clamped_square_plate_at_the_middle_of_an_edge() -> None:
     """σ = −6 · 0.0513 q a²/t², from the two rows of Gauss points beside the edge."""
     exact, errors = -6 * 0.0513 * Q * SIDE**2 / T**2, []
-    for elements in (8, 16, 32):
+    for elements in (8, 32):
         stress = pressed(square(elements), clamped=True)
         first, second = np.unique(stress.places[:, 0])[:2]
         a, b = (near(stress, x, SIDE / 2, 2)[0] for x in (first, second))
