@@ -258,6 +258,7 @@ def test_effects_of_a_scene_keep_the_stages_of_their_points(tmp_path: Path) -> N
 PIN = [[390.0, 100.0]]
 HALVES = [{"name": "1", "on": ["rivets[2:4]"]}, {"name": "2", "on": ["rivets[0:2]"]}]
 SUPPORTS = [[0.0, 10.0], [400.0, 10.0], [200.0, 200.0]]
+RIVETED = "effect[2] (installed_fasteners)"
 BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"name": "1", "on": ["clamp"]}], {}, "stage[0] (1).on = 'clamp'", "did you mean clamps?"),
     ([CLAMP, {"name": "2", "on": ["clamps[0:1]"]}], {}, "stage[1] (2).on = 'clamps[0:1]'", "set twice"),
@@ -271,31 +272,21 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"on": ["clamps"]}], {}, "stage[0].name", "required"),
     ([CLAMP | {"on": "clamps"}], {}, "stage[0].on = 'clamps'", "must be a list"),
     ([CLAMP | {"of": []}], {}, "stage[0].of", "did you mean off?"),
-    (
-        [{"name": "1", "on": ["rivets"]}],
-        {"approach": 0.1},
-        "effect[2] (installed_fasteners).approach",
-        "left out",
-    ),
+    ([{"name": "1", "on": ["rivets"]}], {"approach": 0.1}, f"{RIVETED}.approach", "left out"),
     ([{"name": "1", "on": ["tool"]}], {}, "effect[4] (rigid_tool).name = 'tool'", "makes a contact"),
-    (
-        [{"name": "1", "on": ["rivets[0:3]"]}],
-        {},
-        "effect[2] (installed_fasteners).name",
-        "or none: 3 is in none",
-    ),
+    ([{"name": "1", "on": ["rivets[0:3]"]}], {}, f"{RIVETED}.name", "or none: 3 is in none"),
     ([CLAMP], {"name": "clamps"}, "effect[2].name = 'clamps'", "effect[1] has it"),
     ([CLAMP], {"name": "contacts"}, "effect[2].name = 'contacts'", "the forces of contacts"),
     ([CLAMP], {"name": "initial_gap"}, "effect[2].name = 'initial_gap'", "calls its effects"),
     (
         [{"name": "1", "on": ["rivets"]}],
         {"points": PIN},
-        "effect[2] (installed_fasteners).points",
+        f"{RIVETED}.points",
         "separate places: installed_fasteners acts at the same ones, in stage 1",
     ),
     ([CLAMP], {"approach": [0.1, 0.2]}, "approach", "one for each of 4 springs"),
     ([CLAMP], {"preload": -1.0}, "preload", "in N"),
-    (HALVES, {"preload": [1.0, 2.0, 3.0]}, "effect[2] (installed_fasteners).preload", "each of 4 points"),
+    (HALVES, {"preload": [1.0, 2.0, 3.0]}, f"{RIVETED}.preload", "each of 4 points"),
     (HALVES, {"points": [*RIVETS[:3], RIVETS[2]]}, "points[3] = [210.0, 20.0]", "points[2] is there, too"),
     (
         [{"name": "hold", "on": ["legs"]}, {"name": "let go", "off": ["legs[0:2]"]}],
