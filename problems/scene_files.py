@@ -67,6 +67,7 @@ def read_scene(name_or_path: str) -> Scene:
     if path.suffix == ".npz":
         if not path.is_file():
             raise InputError.one(path, "scene", name_or_path, "no such file")
+        path = path.absolute()  # read when it is solved: perhaps in another folder, or by a worker
         return MatricesScene(path.stem, f"own matrices {path.name}", (("problem", path),), sources=(path,))
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
@@ -75,8 +76,10 @@ def read_scene(name_or_path: str) -> Scene:
     table = read_toml(path)
     is_users = not resolved(path).is_relative_to(SCENES)
     name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()
-    sources = tuple(_files_of(path, table))
-    return replace(_scene(name, path, table), sources=sources)
+    files, assembly = _files_of(path, table), path.parent / str(table.get("assembly", "."))
+    scene = _scene(name, path, table)
+    files += _files_of(assembly, read_toml(assembly)) if isfile(assembly) else []
+    return replace(scene, sources=tuple(dict.fromkeys(file.absolute() for file in files)))
 
 
 def scene_of(table: Mapping[str, Any], name: str = "scene") -> Scene:
@@ -96,7 +99,7 @@ def _as_toml(value: Any) -> Any:
         return {key: _as_toml(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
         return [_as_toml(inner) for inner in value]
-    return value.tolist() if isinstance(value, np.ndarray) else value
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def _unknown_scene(name: str, known: list[str]) -> InputError:
@@ -117,7 +120,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def _files_of(path: Path, table: dict[str, Any]) -> list[Path]:
-    """The file of a scene, and the files that its table names."""
+    """The file of a scene or an assembly, and the files that its table names."""
     queue, named = [*table.values()], [path]
     while queue:
         match queue.pop():
@@ -255,7 +258,7 @@ def _matrices_scene(name: str, title: str, path: Path, data: dict[str, Any]) -> 
         elif not (path.parent / str(value)).is_file():
             faults.append(Fault(str(path), f"matrices.{key}", value, "no such file"))
         else:
-            files.append((key, path.parent / str(value)))
+            files.append((key, (path.parent / str(value)).absolute()))
     if not faults and set(table) not in ({"problem"}, set("KAfg")):
         faults.append(Fault(str(path), "matrices", sorted(table), "K, A, f and g, or problem alone"))
     if faults:

@@ -30,7 +30,6 @@ from PIL import Image
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
 from harness.results import records, series_file
-from harness.results.answer_files import pack
 from harness.results.provenance import ROOT, provenance
 from harness.results.schema import OWNERS, ROUND, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
@@ -41,6 +40,7 @@ from report.results.reader import read
 from report.sections.series_throughput import compared
 from report.sections.time_to_solution import against_ours, how_fast_table, ours_and_others
 from studies.paper.__main__ import write as write_study
+from studies.smaller_results import drop_gaps, pack
 
 PUBLISHED = ROOT / "results" / "published"
 STAGED = ROOT / "results" / "publishing"
@@ -183,7 +183,7 @@ def publish(name: str, directory: Path) -> None:
     for unwanted in _unwanted(directory):
         shutil.rmtree(unwanted) if unwanted.is_dir() else unwanted.unlink()
     if (directory / SERIES_FILE).exists():
-        series_file.drop_gaps(directory)
+        drop_gaps(directory)
     pack(directory)
     for picture in directory.rglob("*.png"):
         slim(picture)

@@ -1,15 +1,18 @@
 """What all tests share: a cache of their own, so that none reads or fills the user's; pictures of few pixels,
-drawn in a quarter of the time; garbage that is looked for less often; quick tests first."""
+drawn in a quarter of the time; what is the same each time, made once: the command line, and what git and the
+installed packages say, which each session, answer and report asks; garbage that is looked for less often;
+quick tests first."""
 
 import gc
 import os
 import shutil
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
-from forked_processes import fork_measuring_processes
+from typer.main import get_command
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 SHARED = ("chromium", "cluster")  # fixtures that take long to make
@@ -17,17 +20,34 @@ ON_WORKERS = ("harness.measurement.task", "harness.placement.session", "harness.
 
 gc.set_threshold(20_000, 20, 100)  # by default a tenth of the time, with all that the tests import
 
-if DISTRIBUTED:  # a thread for each process; read when numpy is loaded
+if DISTRIBUTED:  # a thread for each process; read when numpy is loaded, which these imports do
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+from forked_processes import fork_measuring_processes  # noqa: E402
+
+from harness.results import provenance  # noqa: E402
+
+ASK_GIT, PROJECT = provenance._git, provenance.ROOT
+ask_git_once = cache(ASK_GIT)
+
+
+def _git(*arguments: str) -> str | None:
+    """It is asked again only of the trees that tests make."""
+    return (ask_git_once if provenance.ROOT == PROJECT else ASK_GIT)(*arguments)
 
 
 @pytest.fixture(autouse=True, scope="session")
 def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """One for all processes of pytest-xdist, so that an assembly is built once."""
+    gc.freeze()  # what has been imported is no garbage
     folder = tmp_path_factory.getbasetemp()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         patch.setattr("report.figures.style.DPI", 40)
+        patch.setattr(provenance, "_git", _git)
+        patch.setattr(provenance, "version", cache(provenance.version))
+        patch.setattr(provenance, "_blas", cache(provenance._blas))
+        patch.setattr("typer.testing._get_command", cache(get_command))
         yield
 
 
@@ -57,8 +77,9 @@ def without_pictures(blank_pictures: None, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.fixture
 def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A series writes its rows and gaps alone."""
-    monkeypatch.setattr("report.writers.series_report.write", lambda directory: directory)
+    """A series writes its rows and gaps alone, a run its rows and answers, a search its plans."""
+    for kind in ("series", "suite", "place", "shim"):
+        monkeypatch.setattr(f"report.writers.{kind}_report.write", lambda directory: directory)
 
 
 @pytest.fixture(scope="session")

@@ -26,6 +26,9 @@ class Mine(Solver):
 """
 
 THREAD = "threading.Thread(target=time.sleep, args=(60,)).start()"
+MORE_MEMORY = "held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(60)"
+#: A limit that it exceeds; a fork of the tests does so, too.
+LESS_MEMORY = ("--memory-limit", 700)
 
 
 def write(folder: Path, at_import: str = "", in_solve: str = "pass") -> Path:

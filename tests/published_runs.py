@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from filelock import FileLock
+from sample_size import ASKED
 
 from problems import storage
 from report.page.page_file import write
@@ -11,6 +12,8 @@ from report.results.reader import read
 from studies.publish import PUBLISHED
 
 DIRECTORIES = sorted(path.parent for path in PUBLISHED.glob("*/measurements.jsonl"))
+#: Every third of them, or with RIVETBENCH_LONG all.
+SAMPLED = DIRECTORIES[:: 1 if ASKED else 3]
 
 
 def page_of(directory: Path) -> Path:

@@ -1,6 +1,7 @@
 """Small joints made in code, and the numbering of the plate's unknowns, written down once more."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,14 @@ from problems.effects.measured_gap import MeasuredGap
 from problems.model.effect import Effect, SpringEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
+from problems.scene_files import read_scene
 
 
 def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> Joint:
     data = {"length": 400.0, "width": 120.0, "nodes": (5, 4)} | junction
     part = [{"name": "a", "thickness": 6.0} | table for table in parts]
-    return Joint.model_validate({"junction": data, "part": part, "contacts": contacts})
+    given = {"contacts": contacts} if contacts else {}
+    return Joint.model_validate({"junction": data, "part": part} | given)
 
 
 #: Half of a joint, and a small joint of two of these.
@@ -122,6 +125,13 @@ value = 1e-3
 
 def make_scene(joint: Joint, *effects: Effect) -> JointScene:
     return JointScene("small", "small", joint, effects)
+
+
+def scene_at(path: Path) -> JointScene:
+    """The scene in a file."""
+    scene = read_scene(str(path))
+    assert isinstance(scene, JointScene)
+    return scene
 
 
 def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:

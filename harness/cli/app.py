@@ -4,7 +4,6 @@ Modules that are slow to import are imported inside the commands.
 """
 
 import gc
-import signal
 import sys
 from collections.abc import Callable
 from io import TextIOWrapper
@@ -18,7 +17,7 @@ from harness.terminal.docstrings import docstring
 from .compare import compare, merge
 from .exchange import export, import_, judge
 from .explore import explore
-from .options import NOTHING_WRITTEN, MemoryLimit, Plugin, error_reporting, option
+from .options import NOTHING_WRITTEN, MemoryLimit, Plugin, error_reporting, option, resumable
 from .place import place
 from .scene import init, solve, validate
 from .series import series
@@ -88,13 +87,12 @@ def check(
     \b
     Exit codes: 0 nothing found, 1 faults found, 2 wrong usage or bad input.
     """
-    with error_reporting(interrupted="Interrupted.") as console:
+    with resumable(interrupted="Interrupted.") as console:
         from harness.conformance.isolated import run as run_checks
         from problems.errors import InputError
         from solvers.plugin import unused
         from solvers.registry import modules
 
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         names = solver or ([plugin.stem] if plugin else list(modules()))
         if faults := unused(plugin, names):
             raise InputError(faults)
@@ -125,15 +123,17 @@ def schema(
     Example:
       python -m harness schema scene --out scene.schema.json
     """
-    with error_reporting(*NOTHING_WRITTEN):
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.planning.json_schema import schema_of
-        from harness.results.records import replace_text, to_line
+        from harness.results.atomic_output import atomic_output
+        from harness.results.records import to_line
 
-        text = to_line(schema_of(what)) + "\n"
+        text = to_line(schema_of(what))
         if out is None:
-            typer.echo(text, nl=False)
-        else:
-            replace_text(out, text)
+            console.print(text, soft_wrap=True)
+            return
+        with atomic_output(out) as new:
+            new.write_text(f"{text}\n", "utf-8")
 
 
 app.callback(help=docstring(harness))(harness)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,9 +18,8 @@ from harness.terminal import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from problems.input.tables import TableOptions
-
 NOTHING_WRITTEN = ("", "Interrupted: nothing was written.")
+TRIED = "Interrupted. What was tried is kept: run the same command again."
 WIDTH_OF_A_LOG = 160
 MOST_FAULTS = 100  # shown at once
 LONGEST_LINE = 200  # characters of a file quoted in a message
@@ -27,14 +27,6 @@ LONGEST_LINE = 200  # characters of a file quoted in a message
 
 def option(metavar: str, help: str, *names: str, **limits: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=help, **limits)
-
-
-def table_options(columns: str | None, missing: list[str] | None) -> TableOptions:
-    """How --around, --scans, --gaps and --candidates are read, by --columns and --missing."""
-    from problems.input.tables import TableOptions
-
-    headings = [heading.strip() for heading in columns.split(",")] if columns else []
-    return TableOptions(tuple(headings), tuple(missing or ()))
 
 
 FormName = Literal["primal", "dual", "sparse"]
@@ -60,40 +52,9 @@ Cases = Annotated[
     option("N", "Number of cases.  [default: 100 random ones; all of a table]", min=1, max=10**7),
 ]
 Seed = Annotated[int | None, option("SEED", "Seed of the random gaps.  [default: 0]", min=0)]
-Mean = Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")]
-Spread = Annotated[
-    float | None, option("MM", "Standard deviation of the random gaps.  [default: the scene's]")
-]
-Length = Annotated[
-    float | None, option("MM", "Correlation length of the random gaps.  [default: the scene's]")
-]
-Around = Annotated[
-    Path | None, option("FILE", "A scan, CSV with x, y, gap in mm, that the random gaps pass through.")
-]
-Gaps = Annotated[
-    Path | None,
-    option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
-]
-Scans = Annotated[
-    str | None, option("FILES", "Scans of many joints, as 'scans/*.csv': gaps vary by their principal modes.")
-]
-Variance = Annotated[
-    float | None, option("SHARE", "Share of the scans' variance that the modes keep.  [default: 0.99]")
-]
-Random = Annotated[
-    list[str] | None,
-    option("KEY=LAW", "A random key, as fasteners.preload='normal(1000, 100)'. Repeatable."),
-]
-Columns = Annotated[
-    str | None,
-    option("HEADINGS", "Headings of x, y and gap in FILE, as 'Pos X,Pos Y,Gap'.  [default: x,y,gap]"),
-]
-Missing = Annotated[list[str] | None, option("MARK", "Mark of a missing gap in FILE, as 9999. Repeatable.")]
 Scheduler = Annotated[
     str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
 ]
-
-
 Share = Annotated[
     float | None,
     option(
@@ -110,20 +71,45 @@ Resolution = Annotated[
 def _load_cases(
     cases: Cases = None,
     seed: Seed = None,
-    mean: Mean = None,
-    sd: Spread = None,
-    correlation_length: Length = None,
-    around: Around = None,
-    gaps: Gaps = None,
-    scans: Scans = None,
-    variance: Variance = None,
-    random: Random = None,
-    columns: Columns = None,
-    missing: Missing = None,
+    mean: Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")] = None,
+    sd: Annotated[
+        float | None, option("MM", "Standard deviation of the random gaps.  [default: the scene's]")
+    ] = None,
+    correlation_length: Annotated[
+        float | None, option("MM", "Correlation length of the random gaps.  [default: the scene's]")
+    ] = None,
+    around: Annotated[
+        Path | None, option("FILE", "A scan, CSV with x, y, gap in mm, that the random gaps pass through.")
+    ] = None,
+    gaps: Annotated[
+        Path | None,
+        option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
+    ] = None,
+    scans: Annotated[
+        str | None,
+        option("FILES", "Scans of many joints, as 'scans/*.csv': gaps vary by their principal modes."),
+    ] = None,
+    variance: Annotated[
+        float | None, option("SHARE", "Share of the scans' variance that the modes keep.  [default: 0.99]")
+    ] = None,
+    random: Annotated[
+        list[str] | None,
+        option("KEY=LAW", "A random key, as fasteners.preload='normal(1000, 100)'. Repeatable."),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        option("HEADINGS", "Headings of x, y and gap in FILE, as 'Pos X,Pos Y,Gap'.  [default: x,y,gap]"),
+    ] = None,
+    missing: Annotated[
+        list[str] | None, option("MARK", "Mark of a missing gap in FILE, as 9999. Repeatable.")
+    ] = None,
 ) -> Any:
     from harness.series.load_case_source import GapCases
+    from problems.input.tables import TableOptions
 
-    sources = around, gaps, table_options(columns, missing), tuple(random or ()), None, scans, variance
+    headings = tuple(heading.strip() for heading in columns.split(",")) if columns else ()
+    tables = TableOptions(headings, tuple(missing or ()))
+    sources = around, gaps, tables, tuple(random or ()), None, scans, variance
     return GapCases(cases, seed, mean, sd, correlation_length, *sources)
 
 
@@ -178,3 +164,11 @@ def error_reporting(
     except KeyboardInterrupt:
         errors.print(interrupted, style="yellow")
         raise typer.Exit(INTERRUPTED) from None
+
+
+@contextmanager
+def resumable(**words: str) -> Iterator[Console]:
+    """As `error_reporting`, of work that the same command continues; SIGTERM interrupts it as Ctrl-C does."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with error_reporting(**words) as console:
+        yield console

@@ -1,6 +1,5 @@
 """The command `place`: where fasteners go."""
 
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from . import options
-from .options import error_reporting, option
+from .options import option
 
 
 @options.with_load_cases
@@ -48,13 +47,10 @@ def place(
     \b
     Exit codes: 0 found, 2 wrong usage or bad input, 4 no plan is shown to keep --allow-gap, 130 interrupted.
     """
-    with error_reporting(
-        interrupted="Interrupted. What was tried is kept: run the same command again."
-    ) as console:
+    with options.resumable(interrupted=options.TRIED) as console:
         from harness.placement.run import place as place_fasteners
         from harness.terminal.console import ConsoleReporter, show_verdict
 
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         placement = place_fasteners(
             scene,
             out,

@@ -8,16 +8,8 @@ from typing import Annotated
 import tomlkit
 import typer
 
-from .options import (
-    NOTHING_WRITTEN,
-    AllowGap,
-    AllowStress,
-    FormName,
-    ReferenceLimit,
-    SceneName,
-    error_reporting,
-    option,
-)
+from . import options
+from .options import NOTHING_WRITTEN, error_reporting, option
 
 STARTER = Path(__file__).with_name("starter.toml")
 STARTER_OF_PARTS = STARTER.with_name("starter-superelements.toml")
@@ -29,7 +21,7 @@ DOFS = """dofs = [3]                              # the rows of K at each node: 
 
 
 def solve(
-    scene: SceneName,
+    scene: options.SceneName,
     other: Annotated[
         str | None, typer.Argument(metavar="[OTHER]", help="A second scene on the same junction.")
     ] = None,
@@ -40,15 +32,15 @@ def solve(
     ] = None,
     tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
     form: Annotated[
-        FormName | None,
+        options.FormName | None,
         option(
             "FORM",
             "primal, dual or sparse: without condensation.  [default: by size]",
         ),
     ] = None,
-    reference_limit: ReferenceLimit = None,
-    allow_gap: AllowGap = None,
-    allow_stress: AllowStress = None,
+    reference_limit: options.ReferenceLimit = None,
+    allow_gap: options.AllowGap = None,
+    allow_stress: options.AllowStress = None,
     refine: Annotated[
         bool, typer.Option("--refine", help="Estimate the mesh error from a finer mesh, too.")
     ] = False,
@@ -102,7 +94,7 @@ def solve(
         raise typer.Exit(solve_both((scene, other), out, solved, console))
 
 
-def validate(scene: SceneName) -> None:
+def validate(scene: options.SceneName) -> None:
     """Check a scene without solving it; show what would be built, its size and memory.
 
     \b

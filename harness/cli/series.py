@@ -1,6 +1,5 @@
 """The command `series`: many load cases on one assembly."""
 
-import signal
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -8,24 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from .options import (
-    AllowGap,
-    FormName,
-    MemoryLimit,
-    Plugin,
-    Resolution,
-    SceneName,
-    Scheduler,
-    Share,
-    error_reporting,
-    option,
-    with_load_cases,
-)
+from . import options
+from .options import option
 
 
-@with_load_cases
+@options.with_load_cases
 def series(
-    scene: SceneName,
+    scene: options.SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
     source: Callable[[], Any],
     sweep: Annotated[
@@ -35,11 +23,11 @@ def series(
     find: Annotated[
         str | None, option("KEY=LOW:HIGH", "Find how far a key may go to keep --allow-gap in a --share.")
     ] = None,
-    share: Share = None,
-    resolution: Resolution = None,
+    share: options.Share = None,
+    resolution: options.Resolution = None,
     solver: Annotated[str, option("NAME", "The solver.")] = "newton",
     form: Annotated[
-        FormName | None, option("FORM", "primal, dual or sparse.  [default: the cheaper one]")
+        options.FormName | None, option("FORM", "primal, dual or sparse.  [default: the cheaper one]")
     ] = None,
     tolerance: Annotated[float, option("TOL", "Tolerance passed to the solver.")] = 1e-11,
     limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
@@ -54,13 +42,13 @@ def series(
             min=1,
         ),
     ] = None,
-    plugin: Plugin = None,
+    plugin: options.Plugin = None,
     time_limit: Annotated[
         float, option("SECONDS", "Time limit per load case; for a plug-in.", min=0.001)
     ] = 60.0,
-    memory_limit: MemoryLimit = 8192,
-    scheduler: Scheduler = None,
-    allow_gap: AllowGap = None,
+    memory_limit: options.MemoryLimit = 8192,
+    scheduler: options.Scheduler = None,
+    allow_gap: options.AllowGap = None,
     contributors: Annotated[
         int | None, option("N", "Base points, a power of 2: what does each random input contribute?")
     ] = None,
@@ -93,7 +81,7 @@ def series(
     Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
                 3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
-    with error_reporting() as console:
+    with options.resumable() as console:
         from harness.commands.limit_search import tolerance as find_limit
         from harness.commands.load_case_series import run_series
         from harness.series.session import SeriesOptions
@@ -101,7 +89,6 @@ def series(
         from harness.terminal.console import ConsoleReporter, show_verdict
         from problems.errors import InputError
 
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         cases = replace(source(), contributors=contributors)
         settings = SeriesOptions(solver, form, *accuracy, threads, plugin, *limits)

@@ -1,6 +1,5 @@
 """The command `shim`: what goes between the parts."""
 
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from . import options
-from .options import error_reporting, option
+from .options import option
 
 CSV = "x_min, x_max, y_min, y_max in mm, or outlines: name, x, y"
 
@@ -52,13 +51,10 @@ def shim(
     \b
     Exit codes: 0 found, 2 wrong usage or bad input, 4 no shims are shown to keep the limits, 130 interrupted.
     """
-    with error_reporting(
-        interrupted="Interrupted. What was tried is kept: run the same command again."
-    ) as console:
+    with options.resumable(interrupted=options.TRIED) as console:
         from harness.shimming.shim_run import shim as find_shims
         from harness.terminal.console import ConsoleReporter, show_verdict
 
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         shims = find_shims(
             scene,
             out,

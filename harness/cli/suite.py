@@ -1,13 +1,12 @@
 """The commands for a suite: run, report, gate."""
 
 import os
-import signal
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .options import NOTHING_WRITTEN, Plugin, ReferenceLimit, Scheduler, error_reporting, option
+from .options import NOTHING_WRITTEN, Plugin, ReferenceLimit, Scheduler, error_reporting, option, resumable
 
 
 def run(
@@ -85,7 +84,7 @@ def run(
     Exit codes: 0 measured, 1 incomplete: workers were lost, 2 wrong usage or bad input,
                 3 nothing could be judged, 130 interrupted.
     """
-    with error_reporting() as console:
+    with resumable() as console:
         from harness.commands.suite_runs import run as run_suite
         from harness.planning.overrides import Overrides, tolerances_of
         from harness.terminal.console import ConsoleReporter
@@ -106,7 +105,6 @@ def run(
             reference_limit_s=reference_limit,
             plugin=plugin,
         )
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         reporter = ConsoleReporter(console)
         outcome = run_suite(suite, out, change, scheduler=scheduler, key=key, reporter=reporter)
         if outcome.report:
@@ -184,6 +182,7 @@ def gate(
             json_file=json,
             junit_file=junit,
         )
+        code = show(outcome, console)  # said also if the page cannot be written
         if page := os.environ.get("GITHUB_STEP_SUMMARY"):
             append_summary(Path(page), outcome)
-        raise typer.Exit(show(outcome, console))
+        raise typer.Exit(code)

@@ -27,7 +27,7 @@ from harness.measurement.scheduler import shared, threads_per_worker
 from harness.results import records, series_file
 from harness.results.atomic_output import refuse_inputs
 from harness.results.records import TOLERANCE
-from harness.scene.allowed_gap import CONFIDENCE, SHARE, refuse_unusable, share_interval
+from harness.scene.allowed_gap import CONFIDENCE, SHARE, refuse_unusable, share_in_words, share_interval
 from harness.scene.solution import Source, load_scene
 from harness.series.load_case_source import DEFAULT, GapCases
 from harness.series.session import SeriesOptions
@@ -178,7 +178,7 @@ def tolerance(
         least, largest = bounds(value, seed)
         count, total = int((largest <= allow_gap_mm).sum()), len(largest)
         missing, most = int(np.isnan(largest).sum()), total - int((least > allow_gap_mm).sum())
-        low, high = share_interval(count, total)[0], share_interval(most, total)[1]
+        low, high = share_interval(count, total, most - count)
         figures = {"value": value, "cases": total, "kept": count, "share": count / total}
         shares.append(figures | {"low": low, "high": high, "fresh": seed is not None, "no_answer": missing})
         which = "cases" if seed is None else "fresh cases"
@@ -198,11 +198,8 @@ def tolerance(
         value, rising = outcome.value, kept(values[0])[0] < kept(values[-1])[0]
         while value is not None and not cases.gaps:
             fresh, possible = kept(value, (cases.seed or 0) + 1)
-            least, most = share_interval(fresh, count)[0], share_interval(possible, count)[1]
-            said.append(
-                f"At {value:g} it is kept in {fresh} of {count} fresh cases, proven: the share of joints is "
-                f"between {least:.2%} and {most:.2%}, with {CONFIDENCE:.0%} confidence."
-            )
+            words = share_in_words(fresh, count, possible - fresh)
+            said.append(f"At {value:g} it is kept in {fresh} of {count} fresh cases, proven: {words}.")
             outcome = replace(outcome, value=value, passed=share_interval(fresh, count)[1] >= share)
             safe = min(max(outcome.interval[rising], values[0]), values[-1])
             if outcome.passed or value == safe:

@@ -26,6 +26,7 @@ from harness.terminal.console import console_of
 from problems.errors import Fault, InputError
 from problems.load_cases import LoadCases
 from problems.load_cases.sweep import sweep as swept
+from problems.model.scene import ManufacturedScene
 from problems.reporter import SILENT, Reporter
 from solvers.plugin import unused
 
@@ -124,6 +125,9 @@ def run_series(
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
     faults += unused(options.plugin, [solver])
+    if options.plugin and isinstance(read, ManufacturedScene):
+        allowed = "a scene in a file, which another process can read: `export` makes one"
+        faults.append(Fault("--plugin", "scene", read.name, allowed))
     for name, value, usual in (
         ("time-limit", options.time_limit_s, STANDARD.time_limit_s),
         ("memory-limit", options.memory_limit_mib, STANDARD.memory_limit_mib),
@@ -159,8 +163,9 @@ def run_series(
     for sentence in (*read.unusual, *chosen.notes):
         reporter.say(sentence)
     threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
-    form_and_threads = {"form": choice.form, "threads": threads}
-    job = Job(**vars(options) | form_and_threads, scene=read, cases=chosen)
+    plugin = Path(options.plugin).absolute() if options.plugin else None  # workers may be elsewhere
+    settled = {"form": choice.form, "threads": threads, "plugin": plugin}
+    job = Job(**vars(options) | settled, scene=read, cases=chosen)
     facts = {"solver_version": made.version, "solver_code": made.code}
     files = fingerprints(inputs) if report else {}  # now: they may change meanwhile
     code = run(job, facts, directory, console_of(reporter), scheduler)
@@ -176,4 +181,4 @@ def run_series(
         from report.writers.series_report import write  # slow to import: not before the first row
 
         path = write(directory)
-    return SeriesOutcome(directory, code, tuple(verdict["said"]), verdict["kind"], path)
+    return SeriesOutcome(directory.absolute(), code, tuple(verdict["said"]), verdict["kind"], path)

@@ -19,7 +19,7 @@ from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import open_problem
 from problems.errors import InputError
 from problems.forms import FORMS, Form
-from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Vector
+from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import dual_alone
 from problems.forms.problem import in_form
 from problems.input.matrix_entries import SYMMETRY, contradictions
@@ -163,7 +163,7 @@ def solve_dual(
     >>> solve_dual([[2.0, 0.0], [0.0, 1.0]], [4.0, -1.0], "gi").lam.tolist()
     [2.0, 0.0]
     """
-    Q = np.array(Q, dtype=float, order="F")
+    Q = np.asfortranarray(_numbers("solve_dual", "Q", Q))
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1]:
         raise InputError.one("solve_dual", "Q.shape", Q.shape, "must be a square matrix")
     if not np.isfinite(Q).all():
@@ -249,6 +249,7 @@ def solve_series(
     )
     session = SeriesSession(job, chosen)
     if isinstance(cases, LoadCases):
+        next(_copies([cases.load(cases.first)], session.data.assembly))  # refused if made for another form
         return _results(session, [cases])
     copies = _copies(cases, session.data.assembly)
     return _results(session, _blocks(list(copies) if isinstance(cases, Sequence) else copies, session.block))
@@ -280,13 +281,21 @@ def _results(session: SeriesSession, blocks: Iterable[LoadCases]) -> Iterator[Re
             yield from some
 
 
-def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:
+def _numbers(where: str, name: str, value: ArrayLike) -> Matrix:
+    """A copy, which a form may make read-only. Raises InputError unless it has real numbers alone."""
     try:
-        vector = np.array(value, dtype=float)  # a copy, which a form may make read-only
+        if np.iscomplexobj(value):  # NumPy would leave the imaginary parts out
+            raise TypeError("complex")
+        numbers = np.array(value, dtype=float)
     except (TypeError, ValueError) as error:
-        raise InputError.one(where, name, value, "must be numbers") from error
+        raise InputError.one(where, name, value, "must be real numbers") from error
     if np.ma.is_masked(value):
         raise InputError.one(where, name, "a masked array", "a number in each place; some are masked")
+    return numbers
+
+
+def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:
+    vector = _numbers(where, name, value)
     if vector.shape != (size,):
         raise InputError.one(where, f"{name}.shape", vector.shape, f"must be ({size},)")
     for k in np.flatnonzero(~np.isfinite(vector))[:1]:

@@ -7,8 +7,8 @@ import pandas as pd
 
 from harness.results.atomic_output import refuse_unwritable
 from harness.results.comparison import Incomparable, Side, measurement, read_side, refuse_incomparable
-from harness.results.records import MEASUREMENTS
-from problems.errors import read_all
+from harness.results.records import MEASUREMENTS, refuse_other_command
+from problems.errors import InputError, read_all
 from report.analysis.comparison import compared
 from report.document.escape import quoted
 from report.results.rows import frame
@@ -51,7 +51,7 @@ def compare(
     Raises
     ------
     InputError
-        If a directory has no rows.
+        If a directory has no rows, or `out` has such files of something else.
     Incomparable
         If the runs are of other problems or limits, or `max_slowdown` is given and the machines differ.
 
@@ -69,8 +69,13 @@ def compare(
     [False]
     """
     names = [str(new)] if isinstance(new, str | Path) else list(map(str, new))
+    limits = ("--max-digits-lost", max_digits_lost, 0), ("--max-slowdown", max_slowdown, 1)
+    for option, most, least in limits:
+        if most is not None and not most >= least:
+            raise InputError.one(option, "limit", most, f"{least} or larger")
     if out is not None:
         refuse_unwritable(Path(out), [Path(name) / MEASUREMENTS for name in (str(old), *names)])
+        refuse_other_command(Path(out), "comparison.md", ("comparison.csv", "index.html"))
     base, *sides = read_all(lambda name: read_side(name, key), [str(old), *names])
     comparisons = [_compared(base, side, max_digits_lost, max_slowdown) for side in sides]
     if out is not None:

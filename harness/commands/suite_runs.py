@@ -15,7 +15,6 @@ from harness.results.row_validation import refuse_unreadable
 from harness.results.schema import SERIES
 from harness.results.series_file import refuse_damaged
 from harness.terminal.console import console_of
-from problems.errors import InputError
 from problems.reporter import SILENT, Reporter
 
 AS_IT_IS = Overrides()
@@ -101,10 +100,10 @@ def run(
         refuse_inputs([directory / SUITE], [Path(suite)])
     code = run_suite(chosen, directory, console_of(reporter), scheduler, key)
     if not (directory / MEASUREMENTS).is_file():
-        return SuiteOutcome(directory, code, None)
+        return SuiteOutcome(directory.absolute(), code, None)
     from report.writers.suite_report import write  # slow to import: not before the first row
 
-    return SuiteOutcome(directory, code, write(directory))
+    return SuiteOutcome(directory.absolute(), code, write(directory))
 
 
 def report(directory: str | Path) -> Path:
@@ -140,9 +139,6 @@ def report(directory: str | Path) -> Path:
 
         refuse_damaged(directory)
         return write_series(directory)
-    path = directory / MEASUREMENTS
-    if not path.is_file():
-        raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
     refuse_unreadable(directory)
     if (directory / SUITE).is_file():
         read_written(directory / SUITE)

@@ -12,6 +12,7 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from harness.placement.candidates import movable_fasteners
 from harness.planning.form_choice import chosen_form
@@ -129,7 +130,7 @@ class LiveAnswer:
         Remaining gaps.
     error_mm : float, optional
         Proven bound on the error of every gap, mm; None while nothing is proven. In a stage it holds for the
-        approaches that the stages before have locked.
+        approaches that the stages before have locked; infinite if these are not proven to 1e-7 mm.
     stage : str
         The name of its stage; "" without stages.
     stages : tuple of LiveAnswer
@@ -233,19 +234,27 @@ class Explorer:
         scene = replace(self.scene, effects=settings.applied(self.scene))
         sessions, starts = iter(self.sessions), list[DualStart]()
         earlier = iter(near.starts) if near else repeat(None)
+        locks_mm = 0.0  # the largest bound on an answer in which fasteners lock
 
         def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, LiveAnswer]:
             session, start = next(sessions), next(earlier)
             load = session.load(locked(part, approaches[:, 0]).effects, start)
             lam, gap = session.solved(load, PROVEN_MM if proven else TOLERANCE_MM, start)
-            x, error = np.zeros(len(load.f)), None
+            x, error, bound_mm = np.zeros(len(load.f)), None, 0.0
             if proven:
-                x, gap, error = session.proven(load, lam)
+                x, gap, error, bound_mm = session.proven(load, lam)
+                error = error if locks_mm <= LIMIT_MM else np.inf
             elif scene.stages:  # else nothing is locked
                 x = session.data.assembly.K.solve(load.f - session.data.assembly.A @ lam)
             starts.append(DualStart(load, lam, gap))
             answer = LiveAnswer(settings, load, lam, gap, error)
-            return lambda T: T.T @ session.data.assembly.at_junction(x), answer
+
+            def elongations(T: sp.csc_array) -> Matrix:
+                nonlocal locks_mm
+                locks_mm = max(locks_mm, bound_mm)
+                return T.T @ session.data.assembly.at_junction(x)
+
+            return elongations, answer
 
         stages = [replace(answer, stage=name) for name, _, _, answer in through(scene, solved)]
         return replace(stages[-1], stages=tuple(stages) if scene.stages else (), starts=tuple(starts))
@@ -277,8 +286,8 @@ class _Session(StiffnessSession):
         """λ (m,) N and the gaps (m,) mm."""
         return self.sweeps.vectors(self.sweeps.solved(load, tolerance, start))
 
-    def proven(self, load: DualLoadCase, lam: Vector) -> tuple[Vector, Vector, float]:
-        """x and the gaps (m,) that belong to λ, mm, and the largest error of a gap, mm."""
+    def proven(self, load: DualLoadCase, lam: Vector) -> tuple[Vector, Vector, float, float]:
+        """x and the gaps (m,) that belong to λ, mm, and the largest errors of a gap and of x, mm."""
         (assessed,) = assess(self.proof, [load], [lam], [None], LIMIT_MM / 2)
         error = self.gap_error(load.g, assessed.x, assessed.bound_mm)
-        return assessed.x, assessed.gap, float(error.max(initial=0.0))
+        return assessed.x, assessed.gap, float(error.max(initial=0.0)), assessed.bound_mm

@@ -19,7 +19,7 @@ from harness.results.records import Row
 from harness.results.row_validation import refuse_wrong_kinds
 from harness.solving.solver_answer import shown
 from problems.errors import Fault, InputError, read_all
-from problems.forms import FORMS, default_form
+from problems.forms import FORMS
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene
 from problems.storage import ROOT, fingerprint
@@ -49,10 +49,6 @@ class Description:
     code: str
     owner: str = "library"
     failure: str = ""
-
-    @property
-    def default_form(self) -> Form:
-        return default_form(self.forms)
 
 
 #: By name and label.

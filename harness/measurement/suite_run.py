@@ -35,14 +35,14 @@ from harness.verification.reference_problem import (
     record,
     record_refusal,
 )
-from problems.forms import form_family
+from problems.forms import default_form, form_family
 from problems.forms.problem import in_form
 from problems.scene_files import read_scene
 from report.document.numbers import counted, upwards
 
 from .recorded_suite import other_suite, record_suite
 from .scheduler import done_as_completed, workers
-from .solver_descriptions import Description, Solvers, describe, resumed, rows_in
+from .solver_descriptions import Solvers, describe, resumed, rows_in
 from .task import Task, TaskResult, rows_of, run_task, run_task_on_worker
 
 
@@ -58,9 +58,10 @@ def run(
     if key is not None:
         key = key.partition(ROUND)[0]
         suite = with_key(suite, key)
-    descriptions = describe(suite, ConsoleReporter(console))
-    suite = with_forms(suite, descriptions)
-    solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
+    pairs = list(zip(suite.solver, describe(suite, ConsoleReporter(console)), strict=True))
+    solvers = {(e.name, e.label): d for e, d in pairs}
+    filled = [e.model_copy(update={"forms": e.forms or [default_form(d.forms)]}) for e, d in pairs]
+    suite = suite.model_copy(update={"solver": filled})
     plan = expand(suite)
     if key is not None:
         plan = of_key(plan, key)
@@ -91,13 +92,6 @@ def run(
     return FAILED if missing else code
 
 
-def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
-    """The suite with the usual form for each entry that names none."""
-    entries = zip(suite.solver, descriptions, strict=True)
-    filled = [e.model_copy(update={"forms": e.forms or [solver.default_form]}) for e, solver in entries]
-    return suite.model_copy(update={"solver": filled})
-
-
 #: For so long after the beginning of a round, what is measured on its scene is measured beside it.
 ROUND_LASTS = timedelta(hours=1)
 #: A task that is being done, and the problem that its answers are judged on.
@@ -113,7 +107,7 @@ Outcomes = Callable[
 def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Iterator[Outcomes]:
     """One measurement after another here, or one at a time on each worker of a scheduler."""
     if scheduler is None:
-        answers = directory / "answers"
+        answers = (directory / "answers").absolute()  # a solver may go to another folder
         yield lambda tasks: ((pending, run_task(task, answers)) for pending, task in filter(None, tasks))
         return
     with workers(scheduler, console) as (executor, count):
@@ -184,7 +178,7 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task(batch, self.solvers[m.solver, m.entry.label])
+            task = Task(batch, self.solvers[m.solver, m.entry.label], problem.scene.key)
             self.running[m.key] = m
             yield (task, problem), task
 

@@ -15,7 +15,9 @@ from harness.results.schema import MEASURED, STEPS, MeasurementRow, Origin, Prov
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
+from problems.errors import InputError
 from problems.forms.problem import in_form
+from problems.scene_files import read_scene
 from report.document.numbers import upwards
 
 from .solver_descriptions import Description
@@ -24,10 +26,14 @@ from .worker import FinishedReport, measure, scene_to_measure
 
 @dataclass(frozen=True)
 class Task:
-    """The work of one process: a measurement, or load cases of a series."""
+    """The work of one process: a measurement, or load cases of a series.
+
+    scene_key : that of the scene on whose reference the answers are judged; "": not told.
+    """
 
     batch: list[Measurement]
     solver: Description
+    scene_key: str = ""
 
 
 @dataclass(frozen=True)
@@ -45,7 +51,14 @@ class TaskResult:
 
 
 def run_task(task: Task, answers: Path) -> TaskResult:
-    """Measure; the answer files go into the directory `answers`."""
+    """Measure; the answer files go into the directory `answers`.
+
+    Raises InputError if the file of the scene is another than that on which they are judged.
+    """
+    source = task.batch[0].source
+    if task.scene_key not in ("", read_scene(source).key):
+        allowed = "the file that the run has read: it has changed since, or is another on this worker"
+        raise InputError.one(source, "scene", "another", allowed)
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[FinishedReport]
     if task.solver.failure:
@@ -72,7 +85,12 @@ def run_task_on_worker(task: Task) -> TaskResult:
 def rows_of(
     task: Task, result: TaskResult, problem: ReferenceProblem, directory: Path, origin: Origin
 ) -> list[Row]:
-    """The rows of a task, its answers judged."""
+    """The rows of a task, its answers judged. Raises OSError if one could not be saved: that is no failure of
+    its solver.
+    """
+    for report in result.reports:
+        if "cannot_save" in report:
+            raise OSError(report["cannot_save"])
     answers = [directory / "answers" / f"{m.stem}.npz" for m in task.batch]
     for answer, content in zip(answers, result.files or (), strict=bool(result.files)):
         if content is not None:

@@ -18,9 +18,9 @@ from scipy.linalg import lapack
 
 from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, cpu_model, resident_mib
-from harness.results.records import Row
+from harness.results.records import Row, replace_arrays
 from harness.results.schema import Report
-from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures, save
+from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures
 from harness.solving.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -208,8 +208,9 @@ class Run(Reporter):
             self.events.report(**yardstick(problem.yardstick))
         if x is None:
             return {"status": answer.status, "answer": None}
+        lam = np.full(problem.assembly.m, np.nan) if answer.lam is None else answer.lam
         try:
-            save(file, x, answer.lam, problem.assembly.m)
+            replace_arrays(file, {"x": x, "lam": lam})
         except OSError as error:
             return {"status": "failed", "answer": None, "cannot_save": f"{file}: {error}"}
         return {"status": answer.status, "answer": f"answers/{file.name}"}

@@ -10,10 +10,13 @@ from typing import Any
 
 from harness.measurement.scheduler import done_as_completed, refuse_lost_workers
 from harness.placement.session import Outcome, Question, Study, answer
+from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.records import to_line
+from harness.series.load_case_source import RANDOM, GapCases
 from problems.errors import InputError
 from problems.forms import Form
+from problems.model.scene import JointScene
 from problems.storage import digest
 
 
@@ -65,12 +68,14 @@ class AnswerJournal:
         self.answers[text] = outcomes
 
 
-def recorded_form(path: Path, forms: Sequence[Form]) -> Form | None:
-    """The form of the answers in a journal, if it is one of `forms`; None without a journal."""
+def form_of_search(path: Path, scene: JointScene, forms: Sequence[Form], cases: GapCases, items: int) -> Form:
+    """The form of the answers in a journal, if it is one of `forms`; else the cheaper, for so many items."""
+    wanted: Form | None = None
     with suppress(OSError, ValueError), path.open("rb") as file:
-        form = records.parsed(file.readline()).get("form")
-        return next((one for one in forms if one == form), None)
-    return None
+        recorded = records.parsed(file.readline()).get("form")
+        wanted = next((form for form in forms if form == recorded), None)
+    count = 1 if cases.is_single(scene) else cases.count or RANDOM
+    return chosen_form(scene, forms, wanted, count * items).form
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:

@@ -19,13 +19,13 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
-from math import ceil, floor, log, log10
+from math import ceil, floor, isfinite, log, log10
 
 from harness.placement.candidates import Plan
 from harness.placement.plan_search import PlanSearch, Step
 from harness.scene.allowed_gap import CONFIDENCE, SHARE, share_interval
 from problems.errors import InputError
-from report.document.numbers import counted
+from report.document.numbers import counted, rounded_up
 
 ALPHA = 0.05
 POWER = 0.8
@@ -134,8 +134,9 @@ class Sample:
         count = len(numbers)
         step = search.among(numbers, goal.allowed_fresh(count, alpha)).whole(plan, "fresh cases")
         limit = step.gap_mm if goal.limit_mm is None else goal.limit_mm
-        kept = sum(gap <= limit for gap in step.outcome.largest)
-        interval = share_interval(kept, count, 1 - alpha, "exact")
+        known = [gap for gap in step.outcome.largest if isfinite(gap)]  # of the others nothing is proven
+        kept = sum(gap <= limit for gap in known)
+        interval = share_interval(kept, count, count - len(known), 1 - alpha)
         name = "held-back row" if cases.table else "fresh case"
         name = f"{name}s" if count > 1 else name
         return cls(step, numbers, name, kept, interval, search.item)
@@ -147,10 +148,10 @@ class Sample:
         plan = plan if step.plan else f"joints without a {self.item} keep"
         digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
         share, low, high = (f"{100 * value:.{digits}f}" for value in (self.kept / cases, *self.interval))
-        limit = f"{step.gap_mm:.3g} mm" if goal.limit_mm is None else f"{goal.limit_mm:g} mm{goal.also}"
+        limit = rounded_up(step.gap_mm) if goal.limit_mm is None else f"{goal.limit_mm:g}"
         of = f"all {cases}" if self.kept == cases > 1 else f"{share} % of {cases}"
         interval = f"{100 * CONFIDENCE:g} % interval {low} to {high} %"
-        return f"{plan} {limit} in {of} {self.cases} ({interval})"
+        return f"{plan} {limit} mm{goal.also} in {of} {self.cases} ({interval})"
 
 
 @dataclass(frozen=True)

@@ -14,20 +14,19 @@ import pandas as pd
 
 from harness.measurement.scheduler import workers
 from harness.measurement.solver_descriptions import described
-from harness.placement.answer_journal import AnswerJournal, recorded_form
+from harness.placement.answer_journal import AnswerJournal, form_of_search
 from harness.placement.candidates import MovableFasteners, Place, Plan, without_fasteners
 from harness.placement.fresh_cases import Cases, Goal, SearchOutcome, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.search_record import identity_of, record_of, sentence_on
 from harness.placement.session import THREADS, FastenerStudy
-from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints
 from harness.scene.allowed_gap import refuse_unusable
 from harness.scene.scene_file import MOVED, edited, file_of, opened, with_fasteners
 from harness.scene.solution import Source, load_scene
-from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
+from harness.series.load_case_source import DEFAULT, GapCases
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from harness.solving.call_lock import keeps_threads
@@ -139,7 +138,6 @@ def place(
     refuse_inputs([*(directory / name for name in OUTPUTS), *report_files], inputs)
     movable, source = MovableFasteners.of(read), file_of(scene, read)
     holes, names = movable.candidates(None if candidates is None else str(candidates), cases.options)
-    single = cases.is_single(movable.bare)
     faults = cases.faults(table=candidates is not None and Path(candidates).is_file())
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
@@ -152,9 +150,7 @@ def place(
     if faults:
         raise InputError(faults)
     (newton,) = described([("newton", {})], None, "--solver", reporter)
-    number = 1 if single else cases.count or RANDOM
-    wanted = recorded_form(directory / records.PLANS, newton.forms)
-    form = chosen_form(movable.scene, newton.forms, wanted, number * len(holes)).form
+    form = form_of_search(directory / records.PLANS, movable.scene, newton.forms, cases, len(holes))
     study = FastenerStudy(movable.bare, cases.of_search(movable.scene, form), form, movable)
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)

@@ -60,12 +60,9 @@ class Size:
         return self.dense_peak_mib if form in DENSE_FORMS else self.sparse_peak_mib
 
 
-def size_of(scene: Scene, stored: bool = True) -> Size | None:
-    """The size of a joint of plates or of sparse matrices; None for dense arrays, already in memory.
-
-    stored : whether to look for the dense matrices in the cache.
-    """
-    return _size(scene, models_of(scene), stored)
+def size_of(scene: Scene) -> Size | None:
+    """The size of a joint of plates or of sparse matrices; None for dense arrays, already in memory."""
+    return _size(scene, models_of(scene), stored=True)
 
 
 def form_of_stages(scene: Scene) -> Form:
@@ -76,6 +73,7 @@ def form_of_stages(scene: Scene) -> Form:
 
 
 def _size(scene: Scene, models: Sequence["Model"], stored: bool) -> Size | None:
+    """stored : whether to look for the dense matrices in the cache."""
     if isinstance(scene, JointScene) and isinstance(scene.joint, Joint):
         size = _of_joint(scene, scene.joint)
     elif (assembly := models[-1].stored_sparse) is not None:

@@ -49,7 +49,7 @@ class Overrides:
         Memory limit over all processes of a solver, MiB.
     reference_limit_s : float, optional
         Limit on the search for each reference, s.
-    plugin : Path, optional
+    plugin : str or Path, optional
         A Python file with a solver of your own.
     """
 
@@ -65,7 +65,7 @@ class Overrides:
     time_limit_s: float | None = None
     memory_limit_mib: int | None = None
     reference_limit_s: float | None = None
-    plugin: Path | None = None
+    plugin: str | Path | None = None
 
 
 def overridden(suite: Suite, change: Overrides) -> Suite:
@@ -87,13 +87,13 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             allowed = ", ".join(map(str, sorted(set(sizes.values()))))
             faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
         data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
-    plugin = str(resolved(change.plugin)) if change.plugin else suite.plugin
+    plugin = str(resolved(Path(change.plugin))) if change.plugin else suite.plugin
     versions = _versions(change, faults)
     solvers = [*change.solvers, *(name for name in versions if name not in change.solvers)]
     if solvers:
         data["solver"] = [entry for entry in data["solver"] if entry["name"] in solvers]
     named = {entry["name"] for entry in data["solver"]}
-    plugins = [change.plugin.stem] if change.plugin and not solvers else []
+    plugins = [Path(change.plugin).stem] if change.plugin and not solvers else []
     data["solver"] += [{"name": name} for name in (*solvers, *plugins) if name not in named]
     faults += unused(change.plugin, [entry["name"] for entry in data["solver"]])
     data["solver"] = [entry | at for entry in data["solver"] for at in versions.get(entry["name"], [{}])]

@@ -1,7 +1,6 @@
 """The answers of a results directory: answers/NAME.npz, or the members of one answers.zip."""
 
 import io
-import shutil
 import zipfile
 import zlib
 from pathlib import Path
@@ -38,14 +37,3 @@ def read_answer(path: Path) -> dict[str, NDArray[Any]]:
             return records.read_arrays(io.BytesIO(file.read(member)))
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError) as error:
         raise ValueError(f"{archive}: {error}") from error
-
-
-def pack(directory: Path) -> None:
-    """Let DIRECTORY/answers.zip take the place of DIRECTORY/answers; the same answers give the same bytes."""
-    folder = directory / "answers"
-    files = sorted(folder.glob("*.npz"))
-    if files:
-        with zipfile.ZipFile(directory / ARCHIVE, "w") as archive:
-            for path in files:
-                archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes(), zipfile.ZIP_LZMA)
-        shutil.rmtree(folder)

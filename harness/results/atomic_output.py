@@ -99,6 +99,8 @@ def refuse_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path]) -
     for option, path in outputs.items():
         if path is not None:
             refuse_unwritable(path, inputs, option)
+            if path.is_dir():
+                raise _unwritable(option, path, "it is a folder")
             for other in (name for name, earlier in files.items() if _is_same(path, earlier)):
                 raise InputError.one(option, "path", str(path), f"is the file of {other}: name another")
             files[option] = path

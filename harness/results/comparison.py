@@ -16,8 +16,8 @@ from pathlib import Path
 
 from problems.errors import Fault, InputError
 
-from .records import MEASUREMENTS, Row, read
-from .row_validation import MAX_FAULTS, refuse_wrong_kinds
+from .records import Row
+from .row_validation import MAX_FAULTS, measured_rows
 from .schema import ROUND
 
 #: The fields that a comparison needs.
@@ -52,14 +52,7 @@ class Side:
 
 def read_rows(name: str) -> Side:
     """All rows of a directory. Raises InputError."""
-    path = Path(name) / MEASUREMENTS
-    if not path.is_file():
-        raise InputError.one("DIR", "directory", name, f"has no {path.name}; `run` creates one")
-    rows = read(path)
-    refuse_wrong_kinds(path, rows, needed=NEEDED)
-    if not rows:
-        raise InputError.one("DIR", "directory", name, f"{path.name} has no row yet")
-    return Side(name, rows)
+    return Side(name, measured_rows(Path(name), NEEDED))
 
 
 def read_side(name: str, key: str | None = None) -> Side:
@@ -85,14 +78,11 @@ def read_side(name: str, key: str | None = None) -> Side:
 def refuse_other_options(side: Side) -> None:
     """Raise InputError if rows of one measurement have other options: they are no repeats of each other."""
     first: dict[str, str] = {}
-    faults: dict[Fault, None] = {}
     for row in side.rows:
         name, options = measurement(row), json.dumps(row.get("options") or {}, sort_keys=True)
         if first.setdefault(name, options) != options:
             allowed = f"{first[name]}, as in an earlier row of this measurement: these are no repeats"
-            faults[Fault(side.name, f"options of {name}", options, allowed)] = None
-    if faults:
-        raise InputError(list(faults)[:MAX_FAULTS])
+            raise InputError.one(side.name, f"options of {name}", options, allowed)
 
 
 def measurement(row: Row) -> str:

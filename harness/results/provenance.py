@@ -47,9 +47,9 @@ def stamp() -> dict[str, Any]:
 
 
 def fingerprints(files: Iterable[Path]) -> dict[str, str]:
-    """The SHA-256 of files by their names; of two of one name, the second by its path."""
+    """The SHA-256 of files by their names; of two of one name, the second by its whole path."""
     digits: dict[str, str] = {}
-    for file in dict.fromkeys(files):
+    for file in dict.fromkeys(file.absolute() for file in files):
         name = str(file) if file.name in digits else file.name
         with file.open("rb") as content:
             digits[name] = hashlib.file_digest(content, "sha256").hexdigest()

@@ -53,13 +53,21 @@ def refuse_wrong_kinds(
         raise InputError(faults[:MAX_FAULTS])
 
 
-def refuse_unreadable(directory: Path) -> None:
-    """Raise InputError, naming file and line, unless the rows of DIRECTORY can be reported on."""
+def measured_rows(directory: Path, needed: Sequence[str] = ("scene",)) -> list[Row]:
+    """The rows of DIRECTORY, at least one. Raises InputError, as `refuse_wrong_kinds` does."""
     path = directory / records.MEASUREMENTS
+    if not path.is_file():
+        raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
     rows = records.read(path)
     if not rows:
         raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
-    refuse_wrong_kinds(path, rows)
+    refuse_wrong_kinds(path, rows, needed=needed)
+    return rows
+
+
+def refuse_unreadable(directory: Path) -> None:
+    """Raise InputError, naming file and line, unless the rows of DIRECTORY can be reported on."""
+    measured_rows(directory)
     problems = directory / "problems.jsonl"
     refuse_wrong_kinds(problems, records.read(problems), PROBLEM)
     faults = []

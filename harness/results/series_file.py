@@ -191,14 +191,6 @@ def write_contacts(directory: Path, arrays: Mapping[str, Any]) -> None:
     write_fact(directory, "contacts", content.getvalue())
 
 
-def drop_gaps(directory: Path) -> None:
-    """Keep the rows alone, in a smaller file."""
-    with connected(directory, "EXCLUSIVE") as connection:
-        connection.execute("UPDATE cases SET gap = NULL")
-        connection.commit()
-        connection.execute("VACUUM")
-
-
 def read_contacts(directory: Path) -> dict[str, NDArray[Any]]:
     """The arrays of `write_contacts`. Raises InputError if they are damaged."""
     path = directory / SERIES

@@ -8,7 +8,6 @@ stores gaps as float32, whose rounding, 6e-8 of the gap, is added to e.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -26,7 +25,6 @@ from report.document.numbers import counted, position, upwards
 
 from .mesh_error import MeshError
 from .solution import Solution
-from .stages import StageAnswer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,15 +53,23 @@ def larger(allowed_mm: float, gap: Vector, e: Vector) -> tuple[Mask, Mask]:
 
 
 def share_interval(
-    kept: int, count: int, confidence: float = CONFIDENCE, method: str = "wilson"
+    kept: int, count: int, unknown: int = 0, confidence: float = CONFIDENCE
 ) -> tuple[float, float]:
-    """The interval for the share of all cases that `kept` of `count` cases show. method : of scipy's
-    `proportion_ci`; "exact" never covers less than the confidence, "wilson" about as much.
+    """The exact interval (Clopper and Pearson) for the share of all cases that `kept` of `count` cases show.
+
+    It covers that share with no less than the confidence. unknown : how many further cases may keep the limit
+    or not: at the lower end none of them does, at the upper end all of them do.
     """
     from scipy.stats import binomtest  # slow to import: not before the first row
 
-    low, high = binomtest(kept, count).proportion_ci(confidence, method)
-    return float(low), float(high)
+    low, high = (binomtest(some, count).proportion_ci(confidence) for some in (kept, kept + unknown))
+    return float(low.low), float(high.high)
+
+
+def share_in_words(kept: int, count: int, unknown: int) -> str:
+    """the share of joints is between 64.55% and 88.44%, with 95% confidence"""
+    low, high = share_interval(kept, count, unknown)
+    return f"the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
 
 
 def check_answer(
@@ -75,12 +81,6 @@ def check_answer(
         check["closer_than_grid_mm"] = mesh.error_mm
     beyond = _beyond_scan(solution.problem.scene, check["contacts"])
     return check | ({"beyond_scan": beyond} if beyond else {})
-
-
-def check_stages(stages: Sequence[StageAnswer], allowed_mm: float, records: list[dict[str, Any]]) -> None:
-    """Put into the record of each stage whether a gap is larger than allowed, None if it cannot be told."""
-    for stage, record in zip(stages, records, strict=True):
-        record["exceeded"] = checked(allowed_mm, stage.gap, stage.gap_error_mm, [])["exceeded"]
 
 
 def checked(
@@ -133,9 +133,8 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
     if answered and not series.swept:  # steps are no sample
         free, per_point = exceeding(series.independent, allowed_mm), series.facts.get("cases_per_point", 1)
         drawn = count * min(per_point, 2) // per_point  # answered or not
-        low, _ = share_interval(free.answered - len(free.cases) - free.undecided, drawn)
-        _, high = share_interval(drawn - len(free.cases), drawn)
-        sure += f"; the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
+        kept = free.answered - len(free.cases) - free.undecided
+        sure += f"; {share_in_words(kept, drawn, drawn - len(free.cases) - kept)}"
     kind, said = "" if result.undecided or answered < count else "pass", [f"{sure}."]
     untold = {f"gaps are proven only to {upwards(result.uncertainty_mm)} mm": result.undecided}
     untold["there is no answer"] = count - answered

@@ -48,11 +48,14 @@ def arrays_of(solution: Solution) -> dict[str, Any]:
 
 
 def bound_shown(solution: Solution) -> float:
-    """The bound of the reference, no less than that of its normal displacements Dx, if these are shown, mm.
+    """The bound of the reference, no less than that of its normal displacements Dx, if these are shown, mm;
+    infinite if fasteners have locked what is not proven.
 
     Of a row of D with q entries the computed sum is off by at most γ_q |D||x|, and by Σ|D| times the bound.
     """
     bound, scene = solution.problem.reference.bound_mm, solution.problem.scene
+    if solution.stages and not np.isfinite(solution.gap_error_mm).all():
+        return np.inf
     if not isinstance(scene, JointScene) or (D := scene.joint.shown) is None or not np.isfinite(bound):
         return bound
     size = abs(D)

@@ -23,9 +23,9 @@ from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
 from harness.planning.suite import read_suite
-from harness.results.atomic_output import PROGRAM, atomic_output, refuse_unwritable
+from harness.results.atomic_output import EXPORTED, PROGRAM, atomic_output, refuse_unwritable
 from harness.results.provenance import fingerprints
-from harness.results.records import replace_text
+from harness.results.records import refuse_other_command, replace_text
 from harness.terminal.console import console_of
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import measurable, open_problem
@@ -87,7 +87,7 @@ def export(
     Raises
     ------
     InputError
-        If the scene or a choice is wrong.
+        If the scene or a choice is wrong, or `out` has such files of something else.
 
     Examples
     --------
@@ -113,6 +113,8 @@ def export(
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     read = load_scene(scene)
     refuse_unwritable(out, read.sources)
+    if form is not None and out.suffix not in WRITERS:
+        refuse_other_command(out, PROGRAM, EXPORTED[1:])
     if format is not None:
         problem = open_problem(read, chosen_form(read, FORMS, None).form)
         data = matrices(problem.prepared, problem.load)
@@ -227,6 +229,9 @@ def _write_test_set(suite: str, out: Path, form: Form, console: Console) -> Path
 
     refuse_unwritable(out)
     scenes = [scene for scene in map(read_scene, read_suite(suite).scenes) if not scene.refused]
+    names = [scene.name for scene in scenes]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError.one(suite, "scenes", twice, "names of their own: results are told apart by these")
     numbers = pa.list_(pa.float64())
     schema = pa.schema([(name, pa.string() if name == "name" else numbers) for name in TEST_SET])
 

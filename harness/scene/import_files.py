@@ -22,12 +22,14 @@ from problems.scene_files import read_scene
 from .validate import digits_sentence, print_facts
 
 
-def import_matrices(files: Sequence[str], out: str | Path, *, reporter: Reporter = SILENT) -> Path:
+def import_matrices(
+    files: str | Path | Sequence[str | Path], out: str | Path, *, reporter: Reporter = SILENT
+) -> Path:
     """Read K, A, f, g from other programs' files, check them, and write them as one .npz, which is a scene.
 
     Parameters
     ----------
-    files : sequence of str
+    files : str, Path or sequence of these
         PATH, NAME=PATH for a file of one matrix, NAME=PATH:MATRIX for one of several. K is in N/mm, f in N,
         g in mm.
     out : str or Path
@@ -49,13 +51,14 @@ def import_matrices(files: Sequence[str], out: str | Path, *, reporter: Reporter
     --------
     >>> from rivetbench import export, import_matrices
     >>> op4 = export("gallery/installed-fasteners", "tips.op4", format="op4")
-    >>> import_matrices([str(op4)], "mine.npz").name
+    >>> import_matrices(op4, "mine.npz").name
     'mine.npz'
     """
     out, console = Path(out), console_of(reporter)
     if out.suffix != ".npz":
         raise InputError.one("--out", "path", str(out), "must end in .npz, which makes it a scene")
-    sources = [*map(_source, files)]
+    given = [files] if isinstance(files, str | Path) else files
+    sources = [_source(str(file)) for file in given]
     with atomic_output(out, [path for _, path, _ in sources]) as new:
         data, origin, notes = _read_all(sources)
         checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)

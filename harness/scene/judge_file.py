@@ -19,7 +19,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Vector
 from problems.input.bounded_types import regular_file
-from problems.input.matrix_files import damage
+from problems.input.matrix_files import reading
 from problems.input.tables import Cells, doubt, is_stray, number
 from problems.model.scene import JointScene
 from report.document.numbers import position, upwards
@@ -112,7 +112,7 @@ def read_answer(path: Path) -> dict[str, Vector]:
     if path.suffix.lower() not in (".npz", ".csv"):
         raise InputError.one(path, "suffix", path.suffix, ALLOWED)
     regular_file(path, "file", LARGEST_MIB)
-    try:
+    with reading(path, "file", ALLOWED):
         if path.suffix.lower() == ".csv":
             arrays: Mapping[str, Any] = _columns(path)
         else:
@@ -121,10 +121,6 @@ def read_answer(path: Path) -> dict[str, Vector]:
                 if "x" in names and "unknowns" in archive.files:
                     names["x"] = "unknowns"
                 arrays = {name: archive[stored] for name, stored in names.items()}
-    except InputError:
-        raise
-    except Exception as error:  # numpy, zipfile and csv raise kinds of their own
-        raise InputError.one(path, "file", damage(error), ALLOWED) from error
     vectors: dict[str, Vector] = {}
     for heading, array in arrays.items():
         if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):

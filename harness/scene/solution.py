@@ -91,8 +91,8 @@ class Solution:
 
     @property
     def x(self) -> Vector:
-        """Displacements (n,), mm."""
-        return self.problem.prepared.assembly.at_junction(self.unknowns)
+        """Displacements (n,), mm; a copy."""
+        return np.array(self.problem.prepared.assembly.at_junction(self.unknowns))
 
     @property
     def gap_error_mm(self) -> Vector:
@@ -289,8 +289,8 @@ def _solved(
         method = f"{name}, {choice.form} form, tolerance {tolerance:g}"
         with step(f"solving with {name}"):
             answer = answer_of(name, chosen, problem.prepared, choice.form, problem.load, tolerance)
-    assembly, x = problem.prepared.assembly, np.asarray(answer.x, dtype=float)
-    lam = np.full(assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
+    assembly, x = problem.prepared.assembly, np.array(answer.x, dtype=float)  # not those of the reference
+    lam = np.full(assembly.m, np.nan) if answer.lam is None else np.array(answer.lam, dtype=float)
     judgement = problem.judged(x, lam, LIMIT_MM)
     error = judgement.displacement_error_mm
     if named is None:  # the error of the reference is its bound
@@ -323,6 +323,8 @@ def solver_named(solver: str | Solver, options: Mapping[str, Any] | None) -> tup
         from solvers.registry import make_solver  # slow to import: not without a solver
 
         return solver, make_solver(solver, dict(options or {}))
+    if isinstance(solver, type):
+        raise InputError.one("solver", "class", solver.__name__, f"an object of it: {solver.__name__}()")
     if options:
         raise InputError.one("solver", "options", dict(options), "an object has its options already")
     return type(solver).__name__, solver

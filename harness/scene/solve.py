@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from harness.results.atomic_output import RECORD, atomic_output, refuse_unwritable
-from harness.results.records import replace_text, to_line
+from harness.results.atomic_output import RECORD, atomic_output, refuse_inputs, refuse_unwritable
+from harness.results.records import refuse_other_command, replace_text, to_line
 from harness.terminal import DONE, FAILED
 from harness.terminal.console import ConsoleReporter, show_verdict, table_of
 from problems.errors import InputError
@@ -24,6 +24,9 @@ from .solution import solve
 from .validate import print_unusual
 
 TOLERANCE = 1e-9  # of a named solver, by default
+PAGE = "answer.md"  # a folder with it has an answer
+#: Files of an answer that a folder without one may have from elsewhere.
+OUTPUTS = ("contacts.csv", "fasteners.csv", "index.html", "nodes.csv", "solution.npz", "stress.csv")
 
 
 def solve_into(
@@ -52,6 +55,8 @@ def solve_into(
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
     refuse_unwritable(out, scene.sources)
+    refuse_inputs([out / name for name in OUTPUTS], scene.sources)
+    refuse_other_command(out, PAGE, OUTPUTS)
     stressed = allow_stress is not None or scene.output.stress
     if stressed:
         from . import stress  # only what a scene calls for
@@ -85,7 +90,9 @@ def solve_into(
     verdicts = [record["verdict"], *(stage.judgement.verdict for stage in solution.stages)]
     code = DONE if set(verdicts) == {"within"} else FAILED
     if allow_gap_mm is not None:
-        allowed_gap.check_stages(solution.stages, allow_gap_mm, record.get("stages", []))
+        for stage, line in zip(solution.stages, record.get("stages", ()), strict=True):
+            check = allowed_gap.checked(allow_gap_mm, stage.gap, stage.gap_error_mm, [])
+            line["exceeded"] = check["exceeded"]
         record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
     if allow_gap_mm is not None or stressed or solution.stages:
         from report.page.answer_page_data import (

@@ -4,7 +4,7 @@ No stress is off by more than its sensitivity (problems/model/stress.py) times �
 bounds for the x that is stored, with its rounding. To an answer of a solver its distance from the reference
 is added. The sparse form has all unknowns in x. In the dense forms those inside a part are recovered, and
 ‖x − x*‖_K is that of all of them, too; the roundings of condensation and recovery are not counted. Nor is the
-error of the mesh (mesh_error.py).
+error of the mesh (mesh_error.py). No error is known if fasteners have locked what is not proven.
 
 The sensitivity of a row s of a recovery matrix is ‖s‖_{K⁻¹} ≤ ‖z‖_K + ‖r‖₂/√κ in balanced units, r = s − K z
 with z ≈ K⁻¹s, κ ≤ λmin(K). r is rounded by γ_{n+2} (‖s‖₂ + ‖K‖_∞ ‖z‖₂).
@@ -107,7 +107,7 @@ def stress_record(assembly_stress: Stresses, mesh: MeshError | None, allowed: fl
     said += f"; proven to {upwards(largest['error'])}"
     grid = None if mesh is None else mesh.stress
     said += ", mesh error not known" if grid is None else f", mesh error about {grid:.1g} N/mm²"
-    if none := [part.part for part in assembly_stress.parts if not len(part.places)]:
+    if none := [part.part for part in assembly_stress.parts if part.near_force.all()]:  # or no point at all
         said += f", none known of {', '.join(none)}"
     record: dict[str, Any] = {"largest": largest, "mesh_error": grid, "kind": ""}
     if allowed is None:
@@ -130,11 +130,14 @@ def refuse_unusable(allowed: float | None, scene: Scene) -> None:
 def largest_of(
     scene: JointScene, x: Vector, energy: float = 0.0, point_sensitivities: Sequence[Vector] = ()
 ) -> float:
-    """The largest von Mises stress away from forces at points, N/mm², no less than it can be.
+    """The largest von Mises stress away from forces at points, N/mm², no less than it can be; infinite
+    if no place is away from them.
 
     x : as in `stresses_of`, ± energy, ‖x − x*‖_K. point_sensitivities : see `sensitivities`.
     """
     parts, largest = stresses_of(scene, x), 0.0
+    if all(part.near_force.all() for part in parts):
+        return np.inf
     for part, error in zip(parts, point_sensitivities or [part.sensitivity for part in parts], strict=True):
         with np.errstate(over="ignore", invalid="ignore"):
             upper = part.von_mises + (energy * error if energy else 0.0)  # an error may be infinite
@@ -182,7 +185,8 @@ def stresses(solution: Solution) -> Stresses:
     proof = proof_of(problem.prepared)
     energy = proof.energy_error(problem.load, reference.x, reference.lam)
     point_sensitivities = sensitivities(problem.scene, proof) or [part.sensitivity for part in parts]
-    errors = [energy * one for one in point_sensitivities]
+    locks = np.inf if solution.stages and not np.isfinite(solution.gap_error_mm).all() else 0.0
+    errors = [energy * one + locks for one in point_sensitivities]
     if not solution.from_reference:
         exact = stresses_of(problem.scene, reference.x)
         for part, other, error in zip(parts, exact, errors, strict=True):

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from harness.results.comparison import Incomparable
+from harness.results.records import refuse_other_command
 from harness.terminal import FAILED
 from problems.build import prepared
 from problems.errors import read_all
@@ -24,6 +25,8 @@ from problems.model.surface import surface_of
 from problems.scene_files import read_scene
 
 FOLDERS = ["first", "second"]
+PAGE = "comparison.md"  # a folder with it has a comparison
+OUTPUTS = ("contacts.csv", "fasteners.csv", "index.html", "pairs.csv")
 SHIFT = 0.05  # of the junction's longer side, by which the corners of two meshes of it may differ
 
 
@@ -32,9 +35,10 @@ def solve_both(
 ) -> int:
     """Solve both into DIR/first and DIR/second, write DIR/comparison.md and its files, print what changed.
 
-    Returns the exit code of the second, or 1 if the first has no good answer. Raises InputError, Incomparable
-    if they are not of one junction.
+    Returns the exit code of the second, or 1 if the first has no good answer. Raises InputError, also if
+    DIR has such files of something else; Incomparable if they are not of one junction.
     """
+    refuse_other_command(out, PAGE, OUTPUTS)
     weights = common_places(*sources)
     codes = []
     for source, folder in zip(sources, FOLDERS, strict=True):
@@ -42,6 +46,7 @@ def solve_both(
         console.print(source, style="bold")
         codes.append(solve(source, out / folder))
     from report.document.escape import plain
+    from report.document.numbers import whole
     from report.writers.two_answers_report import write
 
     path, pairs, said = write(out, FOLDERS, weights)
@@ -50,7 +55,8 @@ def solve_both(
         console.print(
             f"{plain(str(line['contact']))}: the largest gap {line['largest_first_mm']:.4g} → "
             f"{line['largest_second_mm']:.4g} mm, mean {line['mean_first_mm']:.4g} → "
-            f"{line['mean_second_mm']:.4g} mm, closed {line['closed_first']} → {line['closed_second']}"
+            f"{line['mean_second_mm']:.4g} mm, closed {whole(line['closed_first'])} → "
+            f"{whole(line['closed_second'])}"
         )
     for sentence in said:
         console.print(plain(sentence))

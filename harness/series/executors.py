@@ -95,6 +95,7 @@ def solve_isolated(
 def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
     """Solve the cases of a task in the child process; each result is an event."""
     job, numbers, batched = task
+    refuse_other_matrices(job)
 
     def report(**event: Any) -> None:
         events.report(**event)
@@ -123,6 +124,13 @@ def ended(job: Job, case: int, end: Row) -> Row:
     }
 
 
+def refuse_other_matrices(job: Job) -> None:
+    """Raise InputError if the files of matrices are others than those that the series began with."""
+    if job.scene_key not in ("", job.scene.key):
+        allowed = "those that the series has read: they have changed since, or are others on this worker"
+        raise InputError.one(job.scene.source_of("K"), "matrices", "others", allowed)
+
+
 @in_turn
 def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
     """Cases of a job, in the session that this process keeps for it: each worker opens the assembly once."""
@@ -130,6 +138,7 @@ def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
     if job.plugin:
         return [result for some in solve_isolated(job, numbers) for result in some]
     if job.key not in _sessions:
+        refuse_other_matrices(job)
         _sessions.clear()
         _sessions[job.key] = session_of(job)
     session = _sessions[job.key]

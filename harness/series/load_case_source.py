@@ -149,7 +149,7 @@ class GapCases:
         ]
         if faults:
             raise InputError(faults)
-        count, seed = self.count or RANDOM, self.seed or 0
+        count, seed = int(self.count or RANDOM), int(self.seed or 0)  # also of NumPy, which keys cannot hold
         fields = scene.effects_of(InitialGap) if isinstance(scene, JointScene) else ()
         drawn = not random or self.around or law != (None, None, None) or any(one.random for one in fields)
         if drawn:

@@ -24,7 +24,7 @@ from harness.results.schema import SERIES, VERDICTS
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
-from problems.errors import Fault, InputError
+from problems.errors import InputError
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
@@ -33,7 +33,6 @@ from report.document.numbers import counted, upwards
 from .executors import results_of
 from .session import Job, Result
 
-MAX_FAULTS = 10  # named at once
 MISSING, OPEN, KEPT = range(3)  # a case: without a row, to be tried again, with its row
 LIMITS = {"time_limit": "time_limit_s", "memory_limit": "memory_limit_mib"}
 
@@ -57,7 +56,8 @@ def run(
             for _, some in groupby(remaining, job.cases.stiffness_of):
                 numbers = list(some)
                 one_K = job.cases.of_stiffness(numbers[0], job.scene)
-                part = replace(job, scene=one_K[0], cases=one_K[1], key=uuid4().hex)  # another session
+                key, scene_key = uuid4().hex, one_K[0].key  # another session
+                part = replace(job, scene=one_K[0], cases=one_K[1], key=key, scene_key=scene_key)
                 with results_of(part, numbers, address, console) as results:
                     solve_remaining(part, len(numbers), results, directory, console)
         return summary(series_file.rows(directory), job.cases.count, console)
@@ -150,16 +150,14 @@ def states(directory: Path, job: Job) -> NDArray[np.int8]:
 
     Raises InputError if one has other parameters than its case now, as after a change of a table.
     """
-    state, faults = np.full(job.cases.count, MISSING, dtype=np.int8), []
+    state = np.full(job.cases.count, MISSING, dtype=np.int8)
     for row in series_file.rows(directory):
         case = row["case"]
         state[case] = OPEN if is_open(row, job) else KEPT
         for name, value in job.cases.parameters(case).items():
             if row.get(name) != value:
                 where, allowed = f"case {case}, {name}", f"is now {value!r}: {records.OTHER}"
-                faults.append(Fault(str(directory / SERIES), where, row.get(name), allowed))
-    if faults:
-        raise InputError(faults[:MAX_FAULTS])
+                raise InputError.one(directory / SERIES, where, row.get(name), allowed)
     return state
 
 

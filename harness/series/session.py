@@ -61,7 +61,7 @@ class SeriesOptions:
         Every `check`-th case is compared with the certified reference; 0: none.
     threads : int, optional
         Threads for linear algebra; by default 2, in the sparse form 1.
-    plugin : Path, optional
+    plugin : str or Path, optional
         A Python file with a solver. It runs in a process of its own, under the two limits below.
     time_limit_s : float
         Time limit per load case of a plug-in, s.
@@ -81,20 +81,25 @@ class SeriesOptions:
     limit_mm: float = LIMIT_MM
     check: int = 100
     threads: int | None = None
-    plugin: Path | None = None
+    plugin: str | Path | None = None
     time_limit_s: float = 60.0
     memory_limit_mib: int = 8192
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job(SeriesOptions):
-    """The cases of a series, and how they are solved. threads : None: as they are."""
+    """The cases of a series, and how they are solved.
+
+    threads : None: as they are. scene_key : that of the scene at the beginning; "": not told.
+    """
 
     scene: Scene
     cases: LoadCases
     form: Form
+    plugin: Path | None = None
     solver_options: dict[str, Any] = field(default_factory=dict)
     key: str = field(default_factory=lambda: uuid4().hex)
+    scene_key: str = ""
 
 
 class Result(NamedTuple):

@@ -1,7 +1,7 @@
 """Shims of its own for each joint: a search in each load case, and the stock that all of them need."""
 
 from dataclasses import dataclass, replace
-from math import floor
+from math import floor, isinf
 from typing import Any
 
 from harness.placement.answer_journal import AnswerJournal
@@ -51,7 +51,7 @@ def each_joint(
     most = goal.allowed_fresh(count, ALPHA)
     if isinstance(study.cases, MeasuredGaps):  # there are no others
         most = floor((1 - goal.share) * count + 1e-9)
-    low, high = share_interval(kept, count, method="exact")
+    low, high = share_interval(kept, count, sum(isinf(one.largest[0]) for one in after))
     words = f"{out_of(kept, count, 'joint')} can be kept within the limits, {100 * kept / count:.1f} %"
     words += f" ({100 * CONFIDENCE:g} % interval {100 * low:.1f} to {100 * high:.1f} %)"
     none = "no shim is needed" if kept == count else "none of these needs a shim"

@@ -8,19 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from harness.measurement.scheduler import workers
-from harness.placement.answer_journal import AnswerJournal, recorded_form
+from harness.placement.answer_journal import AnswerJournal, form_of_search
 from harness.placement.candidates import Plan
 from harness.placement.fresh_cases import ALPHA, Cases, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
 from harness.placement.session import PlanSession
-from harness.planning.form_choice import chosen_form
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs
 from harness.results.provenance import fingerprints, stamp
 from harness.scene.scene_file import add_effect, edited, file_of, opened
 from harness.scene.solution import Source, load_scene
 from harness.scene.stress import refuse_unusable
-from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
+from harness.series.load_case_source import DEFAULT, GapCases
 from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
 from problems.effects.shims import Shims
@@ -168,9 +167,7 @@ def shim(
     ]
     if touching:
         raise InputError(touching)
-    number = 1 if cases.is_single(read) else cases.count or RANDOM
-    wanted = recorded_form(directory / records.SHIMS, FORMS)
-    form = chosen_form(read, FORMS, wanted, number * len(there)).form
+    form = form_of_search(directory / records.SHIMS, read, FORMS, cases, len(there))
     made = cases.of_search(read, form)
     if allow_stress is not None and isinstance(made, RandomInputs):
         keys = [one.name for one in made.inputs]

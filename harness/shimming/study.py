@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.model.fastener_forces import fastener_forces, force_error
 from problems.model.scene import JointScene
 from problems.model.springs import Springs
+from problems.storage import digest
 
 from .patches import Patch
 
@@ -34,6 +36,17 @@ class ShimStudy(Study):
     @property
     def scene(self) -> JointScene:
         return self.staged
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Also the recovery matrices by which superelements have stresses: no key of a scene has these."""
+        parts = getattr(self.bare.joint, "parts", ()) if self.limits[1] < inf else ()
+        tables = [
+            (one.places, one.side, one.S.data, one.S.indices, one.S.indptr)
+            for one in (part.recovery for part in parts)
+        ]
+        arrays = [array.tobytes() for some in tables for array in some]
+        return super().identity | ({"stresses": digest(*arrays)} if arrays else {})
 
     def effect(self, item: Place) -> Shims:
         k, first, last = int(item[0]), item[1], item[-1]

@@ -1,4 +1,4 @@
-"""A solver's answer: whether it is valid, its figures for the row, its file; files that it may not change."""
+"""A solver's answer: whether it is valid, its figures for the row; files that it may not change."""
 
 import json
 from collections.abc import Callable, Iterable
@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from harness.results.records import replace_arrays, to_line
+from harness.results.records import to_line
 from harness.results.schema import Report
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.problem import Problem
@@ -161,11 +161,6 @@ def figures(answer: Answer) -> Report:
         "details": answer.details,
         **({"device": str(answer.details["device"])} if "device" in answer.details else {}),
     }
-
-
-def save(path: Path, x: Vector, lam: Vector | None, m: int) -> None:
-    """Write x (n,) in mm and lam (m,) in N, NaN if the solver gives none; atomically."""
-    replace_arrays(path, {"x": x, "lam": np.full(m, np.nan) if lam is None else lam})
 
 
 class StoredFiles:

@@ -30,7 +30,7 @@ from harness.results.records import Row, replace_text, to_line
 from harness.terminal.console import legible
 
 from .judge import Judgement
-from .slowdown import NEEDED, Times, slowdowns
+from .slowdown import NEEDED, slowdowns
 
 SUITE = "rivetbench gate"
 JUDGED = ("verdict", "displacement_error_mm", "reference_bound_mm")  # of a finding, in JSON
@@ -72,7 +72,7 @@ class Baseline:
     name: str
     margin: float
     errors: Mapping[str, tuple[float, float]]
-    times: Times | None = None
+    times: Mapping[str, float | None] | None = None
 
     def compared(self, row: Row, finding: Finding) -> Finding:
         """The finding of a row beside the baseline: failed if its error is beyond the margin, or by its time.
@@ -93,9 +93,9 @@ class Baseline:
     def _timed(self, finding: Finding, name: str) -> Finding:
         if self.times is None:
             return finding
-        if name not in self.times.compared:
+        if name not in self.times:
             return replace(finding, why=f"its time cannot be compared: that takes {NEEDED}", untimed=True)
-        slowdown = self.times.slower.get(name)
+        slowdown = self.times[name]
         why = f"{slowdown:.2f} times the baseline's time, beside other solvers" if slowdown else ""
         return replace(finding, why=why, slowdown=slowdown)
 

@@ -134,10 +134,13 @@ def gate(
     for option, factor, usual in (("--margin", margin, MARGIN), ("--max-slowdown", max_slowdown, None)):
         if factor != usual and base is None:
             raise InputError.one(option, "factor", factor, "needs --baseline DIR")
+        if factor is not None and not factor >= 1:
+            raise InputError.one(option, "factor", factor, "1 or larger")
     named = {"--json": json_file, "--junit": junit_file}
     outputs = {option: Path(file) if file else None for option, file in named.items()}
     refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])
-    made = validated_rows(folder / records.MEASUREMENTS)
+    made = records.read(folder / records.MEASUREMENTS)
+    refuse_wrong_kinds(folder / records.MEASUREMENTS, made, GATED, NEEDED)
     rows = {row["key"]: row for row in counting(made) if row["gated"]}
     refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
     standard = read_baseline(base, margin, str(folder), rows.values(), max_slowdown) if base else None
@@ -188,13 +191,6 @@ def show(outcome: GateOutcome, console: Console) -> int:
     for sentence in others:
         console.print(sentence)
     return outcome.code
-
-
-def validated_rows(path: Path) -> list[Row]:
-    """The rows of a run. Raises InputError if a field is missing, of another kind or out of bounds."""
-    rows = records.read(path)
-    refuse_wrong_kinds(path, rows, GATED, NEEDED)
-    return rows
 
 
 def judged(

@@ -13,8 +13,6 @@ Three repeats on each side are needed: all new ones are slower by chance once in
 scene become slower alike, nothing is reported. The two runs may be of two machines, but each of one alone.
 """
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from math import inf
 
 import pandas as pd
@@ -27,20 +25,10 @@ from report.results.rows import frame
 NEEDED = f"{ENOUGH} repeats of two solvers on its scene, in both runs"
 
 
-@dataclass(frozen=True)
-class Times:
-    """The comparison of times.
+def slowdowns(old: Side, new: Side, limit: float) -> dict[str, float | None]:
+    """S of each measurement whose time can be compared; None if it is not slower. limit : R.
 
-    compared : the measurements whose times can be compared. slower : S of those that are slower.
-    """
-
-    compared: Collection[str]
-    slower: Mapping[str, float]
-
-
-def slowdowns(old: Side, new: Side, limit: float) -> Times:
-    """The measurements that are slower, limit : R. Raises InputError if no time can be compared; Incomparable
-    if a side has rows of several machines.
+    Raises InputError if no time can be compared; Incomparable if a side has rows of several machines.
     """
     for side in (old, new):
         if len(side.machines) > 1:
@@ -61,5 +49,6 @@ def slowdowns(old: Side, new: Side, limit: float) -> Times:
         raise InputError.one("--max-slowdown", "factor", limit, f"{NEEDED}: --repeat {ENOUGH}")
     lines = pd.concat(beside)
     S = lines["ratio"] / lines["ratio_other"]
-    slower = S[(limit < S) & (lines["ratio_least"] > lines["ratio_most_other"])]
-    return Times({*map(str, lines.index)}, {str(name): float(each) for name, each in slower.items()})
+    slower = (limit < S) & (lines["ratio_least"] > lines["ratio_most_other"])
+    names = map(str, lines.index)
+    return {name: float(s) if more else None for name, s, more in zip(names, S, slower, strict=True)}

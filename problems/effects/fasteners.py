@@ -3,10 +3,10 @@
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Discriminator, Tag
 
 from problems.forms.assembly import Vector
-from problems.input.bounded_types import NUMBER, NUMBERS, Positive, is_list
+from problems.input.bounded_types import Positive
+from problems.model.effect import OneOr
 from problems.model.interface import AnyJoint
 from problems.model.junction_terms import pressing_forces
 from problems.model.positions import Positions
@@ -20,11 +20,7 @@ class Fasteners(Positions):
     """
 
     more_columns: ClassVar[tuple[str, ...]] = ("preload",)
-    preload: Annotated[
-        Annotated[Positive, Tag(NUMBER)] | Annotated[tuple[Positive, ...], Tag(NUMBERS)],
-        Discriminator(is_list),
-        "N",
-    ]
+    preload: Annotated[OneOr[Positive, tuple[Positive, ...]], "N"]
 
     def force(self, joint: AnyJoint) -> Vector:
         presses = [(self.marks(joint), np.asarray(self.preload))]

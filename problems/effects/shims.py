@@ -5,11 +5,11 @@ from itertools import product
 from typing import Annotated
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from problems.forms.assembly import Mask, Matrix, Vector
-from problems.input.bounded_types import NUMBER, NUMBERS, Finite, Positive, Range, is_list
-from problems.model.effect import ContactEffect, Effect, GapEffect
+from problems.input.bounded_types import Finite, Positive, Range
+from problems.model.effect import ContactEffect, Effect, GapEffect, OneOr
 from problems.model.interface import AnyJoint, places_of
 from problems.model.joint import Faults, Pair
 from problems.model.junction_terms import at_contacts
@@ -29,11 +29,7 @@ class Shims(ContactEffect, GapEffect):
     shims add up. Rectangles that touch would both fill the contacts on their common border and are refused.
     """
 
-    thickness: Annotated[
-        Annotated[Positive, Tag(NUMBER)] | Annotated[tuple[Positive, Positive], Tag(NUMBERS)],
-        Discriminator(is_list),
-        "mm",
-    ]
+    thickness: Annotated[OneOr[Positive, tuple[Positive, Positive]], "mm"]
     x: Annotated[Range | None, "mm"] = None
     y: Annotated[Range | None, "mm"] = None
     outline: Annotated[Outline, "mm"] = ()

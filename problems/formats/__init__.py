@@ -82,7 +82,6 @@ FORMATS = {
         (".mtx",),
         matrix_text.write_matrix_market,
         matrix_text.read_matrix_market,
-        matrix_text.is_matrix_market,
         is_folder=True,
     ),
     "npz": Format("a file .npz, bit for bit", (".npz",), _write_npz, _read_npz),
@@ -122,12 +121,8 @@ def read_labelled(path: Path, choose: Choose = list) -> Read:
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
     format = format_of(path)
-    try:
+    with matrix_files.reading(path, "file", "a readable matrix file"):
         read = format.read(path, choose)
-    except InputError:
-        raise
-    except Exception as error:  # of the libraries, which raise whatever a damaged file leads to
-        raise InputError.one(path, "file", matrix_files.damage(error), "a readable matrix file") from error
     for name, (M, labels) in read.items():
         if sp.issparse(M):
             refuse_twice(path, name, M)

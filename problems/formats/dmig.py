@@ -29,7 +29,7 @@ SQUARE, RECTANGULAR, SYMMETRIC, COLUMNS = 1, 2, 6, 9  # forms
 REAL = (1, 2)  # types
 WHOLE = re.compile(r"(\d+)")
 NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([-+]\d+)|[eEdD](\d+))?")
-INCLUDE = re.compile(r"(?mi)^include\b.*$")
+INCLUDE = re.compile(r"(?mi)^[ \t]*include\b.*$")
 Point = tuple[int, int]
 
 
@@ -79,7 +79,7 @@ def read_dmig(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | N
 
 def _read(path: Path, name: str, cards: dict[str, Cards]) -> tuple[Any, np.ndarray | None]:
     form, entries = cards[name].form, cards[name].entries
-    if form in (SQUARE, SYMMETRIC) and name not in "AFG":
+    if form in (SQUARE, SYMMETRIC) and name not in ("A", *OF_PROBLEM):
         points = cards[name].points
         labels = np.array(points, dtype=np.intp)
         return _over(path, name, cards[name], points, points, "points"), labels
@@ -91,9 +91,9 @@ def _read(path: Path, name: str, cards: dict[str, Cards]) -> tuple[Any, np.ndarr
         rows = _first(len({row for row, *_ in entries}))
         what = f"rows 1 … {len(rows)}, as {len(rows)} are present"
     columns = sorted({column for _, column, *_ in entries})
-    if name in "FG" and len(columns) > 1:
+    if name in OF_PROBLEM and len(columns) > 1:
         raise InputError.one(path, f"columns of {name}", len(columns), "must be 1")
-    if name not in "FG":
+    if name not in OF_PROBLEM:
         columns = _columns(path, name, cards)
     what = f"{what}, or of columns 1 … {len(columns)}"
     return _over(path, name, cards[name], rows, columns, what), None

@@ -6,7 +6,8 @@ files of one sparse matrix are read too.
 
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,18 @@ LAYOUTS = {"coordinate": ("row", "column", "entry"), "array": ("entry",)}
 Choose = Callable[[Sequence[str]], Sequence[str]]
 
 
-def damage(error: Exception) -> str:
+@contextmanager
+def reading(path: Path, key: str, allowed: str) -> Iterator[None]:
+    """Within it, whatever a library raises about a damaged file is an InputError, with this key."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # numpy, zipfile and others raise kinds of their own
+        raise InputError.one(path, key, _damage(error), allowed) from error
+
+
+def _damage(error: Exception) -> str:
     """The words for what is wrong with a file, free of the Python terms in a library's exceptions."""
     if isinstance(error, MemoryError):
         return "more than the memory holds, or damaged"
@@ -109,9 +121,10 @@ def texts_of(path: Path) -> list[str]:
 def _kind(archive: Any, name: str) -> str:
     """The kind of an array's entries; "" if it has no dimension, or holds objects."""
     try:
-        return archive[name].dtype.kind if archive[name].ndim else ""
+        array = archive[name]
     except ValueError:  # of objects
         return ""
+    return array.dtype.kind if array.ndim else ""
 
 
 def _refuse_damaged(name: str, M: Any) -> None:

@@ -85,15 +85,10 @@ def read_matrices(files: Files, sparse: bool = False) -> tuple[Assembly, LoadCas
     """
     data: dict[str, Any] = {}
     for key, path in files.items():
-        try:
-            one = key == "problem"
-            read = matrix_files.read(path, list, NAMES) if one else {key: matrix_files.read_mtx(path)}
-        except InputError:
-            raise
-        except Exception as error:  # zipfile and pickle raise their own kinds
-            kind, where = (".npz with K, A, f, g", "file") if one else ("Matrix Market file", key)
-            raise InputError.one(path, where, matrix_files.damage(error), f"a readable {kind}") from error
-        data |= read
+        one = key == "problem"
+        kind, where = (".npz with K, A, f, g", "file") if one else ("Matrix Market file", key)
+        with matrix_files.reading(path, where, f"a readable {kind}"):
+            data |= matrix_files.read(path, list, NAMES) if one else {key: matrix_files.read_mtx(path)}
     data |= {key: data[key].toarray() for key in "fg" if sp.issparse(data.get(key))}
     return checked(data, {key: str(files.get("problem") or files.get(key)) for key in NAMES}, sparse)
 

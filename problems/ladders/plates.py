@@ -37,7 +37,7 @@ def plates(
     """Parts by name on a junction of 1 m × 0.3 m, with effects."""
     junction = {"length": 1000.0, "width": 300.0, "nodes": nodes}
     named = [{"name": name} | part for name, part in parts.items()]
-    joint = {"junction": junction, "part": named, "contacts": contacts}
+    joint = {"junction": junction, "part": named} | ({"contacts": contacts} if contacts else {})
     return _scene(title, joint, *effects, *_loads(0.3, 0.1, columns=4, rows=2, edge=50.0), refused=refused)
 
 

@@ -11,7 +11,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import regular_file
-from problems.input.matrix_files import damage
+from problems.input.matrix_files import reading
 from problems.input.scan_points import neighbours, outliers
 from problems.input.tables import AS_NAMED, TableOptions
 from problems.model.interface import AnyJoint
@@ -89,15 +89,17 @@ def measured_gaps(
     if not isinstance(scene, JointScene):  # the only gap that matrices have
         rest = LoadCase(rest.f, np.zeros(m))
     labels = [] if ids is None else ids[1].tolist()
-    gaps = _read(regular_file(path, "file", TABLE_MIB), m, options, labels)
+    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
+    gaps = _read(regular_file(path, "file", TABLE_MIB), suffix, m, options, labels)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
         allowed = f"one row per case, one column for each of {m} contacts"
         raise InputError.one(path, "shape", gaps.shape, allowed)
     if count is not None and count > len(gaps):
         raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
     gaps, notes = gaps[:count], list[str]()
-    if options.missing:
-        gaps = np.where(np.isin(gaps, options.numbers), np.nan, gaps)
+    if options.missing and suffix != ".csv":  # the marks of a .csv are those of its cells, in its unit
+        marks = np.array(options.numbers, dtype=gaps.dtype if gaps.dtype.kind == "f" else float)
+        gaps = np.where(np.isin(gaps, marks), np.nan, gaps)
     if options.missing and isinstance(scene, JointScene):
         gaps, lost = _completed(scene.joint, gaps)
         notes = [f"{path}: {lost} missing gaps are taken from the nearest contact of their case"] * bool(lost)
@@ -158,9 +160,8 @@ def _refuse_infinite(path: Path, gaps: Matrix) -> None:
         raise InputError.one(path, f"case {wrong[0]}, contact {contact}", float(case[contact]), allowed)
 
 
-def _read(path: Path, m: int, options: TableOptions, labels: Sequence[int]) -> Matrix:
-    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
-    try:
+def _read(path: Path, suffix: str, m: int, options: TableOptions, labels: Sequence[int]) -> Matrix:
+    with reading(path, "file", "a readable table of numbers"):
         match suffix:
             case ".csv":
                 return read_gaps(path, m, TABLE_MIB, options, labels)
@@ -175,7 +176,3 @@ def _read(path: Path, m: int, options: TableOptions, labels: Sequence[int]) -> M
         if gaps.dtype.kind not in "fiu":
             raise ValueError(f"an array of {gaps.dtype}")
         return gaps
-    except InputError:
-        raise
-    except Exception as error:  # numpy and zipfile raise kinds of their own
-        raise InputError.one(path, "file", damage(error), "a readable table of numbers") from error

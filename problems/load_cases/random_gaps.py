@@ -168,6 +168,8 @@ def random_gaps(
         field = InitialGap.model_validate(table | {"mean": values["mean"], "random": random})
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
+    for key, value, usable in field.faults(scene.joint) if scene.joint.pairs else ():  # of a length too short
+        raise InputError.one("series", f"initial_gap.{key}", value, usable)
     others = [effect for effect in scene.effects if effect not in fields]
     made = RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)
     if made.scan is None:

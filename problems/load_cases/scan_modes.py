@@ -18,7 +18,7 @@ import numpy as np
 from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, read_all
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import valid_table
@@ -86,12 +86,8 @@ def scan_modes(
     paths = [Path(name) for name in sorted(glob(pattern))]
     if len(paths) < 2:
         raise InputError.one("--scans", "files", pattern, f"two files or more; {len(paths)} there")
-    faults: list[Fault] = []
-    notes: list[str] = []
-    rows = [gaps_of(scene.joint, path, options, faults, notes) for path in paths]
-    if faults:
-        raise InputError(faults)
-    scans = np.array(rows)
+    joint, notes = scene.joint, list[str]()
+    scans = np.array(read_all(lambda path: gaps_of(joint, path, options, notes), paths))
     mean = scans.mean(axis=0)
     _, s, V = np.linalg.svd((scans - mean) / np.sqrt(len(scans) - 1), full_matrices=False)
     total = np.cumsum(s**2)
@@ -104,19 +100,16 @@ def scan_modes(
     return ScanModes(rest, digest(scans.tobytes()), mean, modes, seed, count, tuple(notes))
 
 
-def gaps_of(
-    joint: AnyJoint, path: Path, options: TableOptions, faults: list[Fault], notes: list[str]
-) -> Vector | None:
-    """The gaps (m,) mm of a scan at the contacts, None with faults; faults and notes go into the lists."""
+def gaps_of(joint: AnyJoint, path: Path, options: TableOptions, notes: list[str]) -> Vector:
+    """The gaps (m,) mm of a scan at the contacts; notes are added to the list. Raises InputError."""
     read = read_columns(path, MeasuredGap.columns, options)
-    faults += read.faults
-    table = {"kind": "measured_gap", "points": read.rows}
-    if read.faults or (effect := valid_table(MeasuredGap, table, path, faults)) is None:
-        return None
-    effect._lines = tuple(f"line {line}" for line in read.lines)
-    if wrong := [Fault(str(path), key, value, allowed) for key, value, allowed in effect.faults(joint)]:
-        faults += wrong
-        return None
+    faults, table = list(read.faults), {"kind": "measured_gap", "points": read.rows}
+    effect = None if faults else valid_table(MeasuredGap, table, path, faults)
+    if effect is not None:
+        effect._lines = tuple(f"line {line}" for line in read.lines)
+        faults += [Fault(str(path), *fault) for fault in effect.faults(joint)]
+    if effect is None or faults:
+        raise InputError(faults)
     notes += [
         f"{path}: {key} = {value} is unusual; usual is {usual}" for key, value, usual in effect.unusual(joint)
     ]

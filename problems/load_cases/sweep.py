@@ -61,8 +61,10 @@ class Key:
             for key in self.path[:-1]:
                 inner = inner[key]
             inner[self.path[-1]] = value
+        keys = ("points", "pattern") if self.path[0] == "points" else self.path[:1]
         try:
-            return effect.model_copy(update=dict(type(effect).model_validate(table)))
+            valid = type(effect).model_validate(table)
+            return effect.model_copy(update={key: getattr(valid, key) for key in keys})
         except ValidationError as error:
             prefix = self.name.removesuffix(f".{'.'.join(self.path)}")
             raise InputError(list(validation_faults(self.name, type(effect), error, prefix))) from error
@@ -221,7 +223,7 @@ def _numbers(table: dict[str, Any]) -> list[tuple[str, ...]]:
     for key, value in table.items():
         if isinstance(value, dict):
             paths += [(key, *path) for path in _numbers(value)]
-        elif isinstance(value, int | float):
+        elif isinstance(value, int | float) and not isinstance(value, bool):
             paths.append((key,))
     return paths
 

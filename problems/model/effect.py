@@ -7,7 +7,7 @@ effect that acts on contacts and adds to the gap derives from two: `class Shims(
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +21,10 @@ from .interface import AnyJoint
 from .joint import Faults, Pair, Table
 from .plate import Plate
 
+N = TypeVar("N")
+L = TypeVar("L")
+#: A number N, or a list L of numbers.
+OneOr = Annotated[Annotated[N, Tag(NUMBER)] | Annotated[L, Tag(NUMBERS)], Discriminator(is_list)]
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
 
@@ -65,10 +69,6 @@ class Effect(Table):
     def contacts(self) -> tuple[Pair, ...]:
         """The contacts (a, b) that this effect adds to the joint."""
         return ()
-
-    def parts(self, joint: AnyJoint) -> tuple[str, ...]:
-        """The names of the parts on which the effect acts."""
-        return joint.names
 
     def marks(self, joint: AnyJoint) -> Matrix:
         """The points that pictures of the junction mark for this effect.
@@ -117,9 +117,6 @@ class PartEffect(Effect):
 
     part: str
 
-    def parts(self, joint: AnyJoint) -> tuple[str, ...]:
-        return (self.part,)
-
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         yield from unknown_part(self.part, joint)
@@ -135,6 +132,7 @@ class ContactEffect(Effect):
         return joint.pairs if self.between is None else (self.between,)
 
     def parts(self, joint: AnyJoint) -> tuple[str, ...]:
+        """The names of the parts on which the effect acts."""
         named = (part for pair in self.pairs(joint) for part in pair)
         return tuple(dict.fromkeys(part for part in named if part in joint.names))
 
@@ -277,16 +275,9 @@ class SpringEffect(ForceEffect):
         N, of all springs or of those at each point.
     """
 
-    approach: Annotated[
-        Annotated[Finite, Tag(NUMBER)] | Annotated[tuple[Finite, ...], Tag(NUMBERS)],
-        Discriminator(is_list),
-        "mm",
-    ] = 0.0
+    approach: Annotated[OneOr[Finite, tuple[Finite, ...]], "mm"] = 0.0
     preload: Annotated[
-        Annotated[NotNegative, Tag(NUMBER)] | Annotated[tuple[NotNegative, ...], Tag(NUMBERS)],
-        Discriminator(is_list),
-        Field(exclude_if=lambda force: force == 0),
-        "N",
+        OneOr[NotNegative, tuple[NotNegative, ...]], Field(exclude_if=lambda force: force == 0), "N"
     ] = 0.0
 
     def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:

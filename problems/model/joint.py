@@ -86,7 +86,7 @@ class Joint(Table):
     ids: ClassVar[None] = None
     junction: Junction
     part: Annotated[tuple[Part, ...], Field(min_length=1, max_length=100)]
-    contacts: tuple[Pair, ...] = ()
+    contacts: Annotated[tuple[Pair, ...], Field(min_length=1)] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -84,11 +84,9 @@ class Positions(ContactEffect, ForceEffect):
             return self
         places = tuple(map(tuple, self.marks(joint)[elements].tolist()))
         update: dict[str, object] = {"points": places, "pattern": None}
-        if isinstance(preload := getattr(self, "preload", None), tuple):
-            update["preload"] = tuple(preload[k] for k in elements)
-        if isinstance(approach := getattr(self, "approach", None), tuple):
-            of_pairs = np.reshape(approach, (-1, count))
-            update["approach"] = tuple(of_pairs[:, elements].ravel().tolist())
+        for key in ("preload", "approach"):
+            if isinstance(values := getattr(self, key, None), tuple):  # an approach has one for each pair
+                update[key] = tuple(np.reshape(values, (-1, count))[:, elements].ravel().tolist())
         some = self.model_copy(update=update)
         for rows in ("_lines", "_stages"):
             if len(words := getattr(self, rows)) == count:

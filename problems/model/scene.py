@@ -150,7 +150,8 @@ class JointScene(Scene):
         if not self.stages:
             return digest(self.assembly_key, loads)
         names = [[effect.name, effect._stages] for effect in self.effects]
-        return digest(self.assembly_key, loads, names, [plain(stage) for stage in self.stages])
+        order = [stage.name for stage in self.stages] if any(words for _, words in names) else []
+        return digest(self.assembly_key, loads, names + order, [plain(stage) for stage in self.stages])
 
     @property
     def expected_size(self) -> tuple[int, int]:

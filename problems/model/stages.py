@@ -150,6 +150,9 @@ class StagePlan:
             if setting and isinstance(effect, SpringEffect) and "approach" in effect.model_fields_set:
                 allowed = f"left out: stage {setting[0]} locks the approach that it has reached"
                 yield f"{where}.approach", effect.approach, allowed
+            if setting and effect._stages and not self.counts[number]:
+                allowed = f"a file without a column stage: a {effect.kind} acts as a whole"
+                yield f"{where}.file", "a column stage", allowed
             never = [k for k in range(self.counts[number]) if (number, k) not in self.staged]
             if setting and never:
                 allowed = f"all of its {self.counts[number]} points in stages, or none: {never[0]} is in none"

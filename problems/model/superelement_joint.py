@@ -50,7 +50,7 @@ class SuperelementJointTable(Table):
 
     pairing: PairingTable = PairingTable()
     part: Annotated[tuple[SuperelementTable, ...], Field(min_length=1, max_length=100)]
-    contacts: tuple[Pair, ...] = ()
+    contacts: Annotated[tuple[Pair, ...], Field(min_length=1)] = ()
 
 
 @dataclass(frozen=True, eq=False)

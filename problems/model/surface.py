@@ -66,11 +66,7 @@ class Grid:
     def areas(self) -> Vector:
         """(nodes,) tributary areas, mm²: their sum is that of the surface."""
         shares = np.outer(_tributary_lengths(self.y), _tributary_lengths(self.x)).ravel()
-        if self.place is None:
-            return shares
-        areas = np.empty(len(shares))
-        areas[self.place] = shares
-        return areas
+        return shares if self.place is None else shares[np.argsort(self.place)]
 
     @property
     def triangles(self) -> Indices:
@@ -196,9 +192,7 @@ def surface_of(nodes: Matrix) -> Surface:
         (x, column), (y, row) = (_lines(axis) for axis in (nodes if turn is None else nodes @ turn).T)
         place = row * len(x) + column
         if len(place) == len(x) * len(y) == len(np.unique(place)):
-            number = np.empty(len(place), dtype=np.intp)
-            number[place] = np.arange(len(place))
-            return Grid(x, y, number, SAME, turn)
+            return Grid(x, y, np.argsort(place), SAME, turn)
     return Triangles.of(nodes)
 
 

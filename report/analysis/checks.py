@@ -1,4 +1,4 @@
-"""Reasons to doubt the figures of a report: mixed and damaged results, and other code."""
+"""Reasons to doubt the figures of a report: mixed results, and other code."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def warnings(results: Results) -> list[str]:
             f"In {counted(len(other), 'row')} ({listed(sorted(other['solver'].unique()))}) the number of "
             "threads in effect was not the requested one, by which the tables name and group them."
         )
-    return [*doubts, *results.warnings]
+    return doubts
 
 
 def asked_for(rows: pd.DataFrame) -> pd.Series[bool]:

@@ -98,10 +98,6 @@ def _widen(table: pd.DataFrame) -> None:
     table.loc[single, "ratio_most"] = np.maximum(table.loc[single, "ratio_most"], most)
 
 
-def _rank(verdict: str) -> int:
-    return VERDICTS.index(verdict) if verdict in VERDICTS else len(VERDICTS)
-
-
 def _errors(table: pd.DataFrame) -> list[pd.Series[float]]:
     bounds = table[["bound_mm_old", "bound_mm_new"]].max(axis=1)
     limits = table["limit_mm_old"].fillna(table["limit_mm_new"])
@@ -117,11 +113,11 @@ def _change(line: dict[Hashable, Any], max_digits_lost: float, max_slowdown: flo
     """The kind of a line, its change in words, and the size of the change among lines of that kind."""
     old, new = line["verdict_old"], line["verdict_new"]
     lost, ratio = line["digits_lost"], line["ratio"]
-    verdict, ranks = f"{_words(old)} → {_words(new)}", _rank(new) - _rank(old)
     if new == MISSING:
         return GONE, "no longer measured", 0.0
     if old == MISSING:
         return NEW, "new", 0.0
+    verdict, ranks = f"{_words(old)} → {_words(new)}", VERDICTS.index(new) - VERDICTS.index(old)
     if ranks > 0:
         return JUDGED_WORSE, verdict, ranks
     if lost > max_digits_lost:

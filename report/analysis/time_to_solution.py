@@ -44,7 +44,7 @@ def stage_seconds(results: Results) -> pd.DataFrame:
     facts = {problem.get("scene"): problem for problem in records(results.problems)}
     built = [_built(cell, facts.get(cell["scene"], {})) for cell in records(cells)]
     lines = cells.assign(**{name: [stages[name] for stages in built] for name in built[0]})
-    lines["solving_s"] = lines[["setup_s", "solve_s"]].sum(axis=1)
+    lines["solving_s"] = lines["setup_s"].fillna(0.0) + lines["solve_s"]
     lines["recovery_s"] = lines["form_s"].fillna(0.0)
     stages = lines[list(STAGES)]
     first = stages.sum(axis=1, skipna=False).where(lines["verdict"] == "within")
@@ -89,18 +89,10 @@ class Exponent:
 
 
 def exponent(n: Sequence[float], y: Sequence[float]) -> Exponent | None:
-    """Least squares in log–log; missing and non-positive values are ignored. None below three sizes.
-
-    The standard error is sqrt(Σr² / (k − 2) / Σ(log n − mean)²), r the residuals of k points.
-    """
+    """Least squares in log–log; missing and non-positive values are ignored. None below three sizes."""
     pairs = [(math.log(a), math.log(b)) for a, b in zip(n, y, strict=True) if b is not None and b > 0]
     if len({a for a, _ in pairs}) < 3:
         return None
     x, z = np.array(pairs).T
-    centred = x - x.mean()
-    spread = float(centred @ centred)
-    slope = float(centred @ z) / spread
-    offset = float(z.mean() - slope * x.mean())
-    rest = z - offset - slope * x
-    error = math.sqrt(float(rest @ rest) / (len(x) - 2) / spread)
-    return Exponent(slope, error, len(x))
+    (slope, _), covariance = np.polyfit(x, z, 1, cov=True)
+    return Exponent(float(slope), math.sqrt(covariance[0, 0]), len(pairs))

@@ -37,7 +37,12 @@ def number(heading: str, name: str, style: Callable[[object], str] = significant
 
 def word(heading: str, name: str) -> Column:
     """Words of the data's column `name`."""
-    return Column(heading, lambda row: str(row[name] or MISSING).replace("|", r"\|"), "left")
+
+    def show(row: Mapping[str, Any]) -> str:
+        text = "" if pd.isna(row[name]) else str(row[name])
+        return text.replace("|", r"\|") or MISSING
+
+    return Column(heading, show, "left")
 
 
 def records(frame: pd.DataFrame) -> list[dict[str, Any]]:

@@ -39,6 +39,12 @@ def upwards(bound: float, digits: int = 2) -> str:
     return f"{bound if shown is None else shown:.{digits - 1}e}"
 
 
+def rounded_up(bound: object) -> str:
+    """0.0913: three digits of a bound above 0.0912, never less than it is; inf where there is none."""
+    shown = raised(bound)
+    return "inf" if shown is None else f"{shown:g}"
+
+
 def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:
     """'(1077.93, 0) mm', to 0.01 mm; on nodes within less than a metre, to 1e-5 of their extent."""
     extent = float(np.ptp(nodes, axis=0).max())

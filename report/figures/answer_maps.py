@@ -72,15 +72,13 @@ def _pairs(
 
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     """Both gaps of each pair, with the closed contacts and those whose gap is larger than allowed."""
-    gaps, outlines = (
-        (arrays["gap_before"], arrays["gap_after"]),
-        [(arrays["lam"] > 0, CLOSED, "closed contacts")],
-    )
+    after, outlines = arrays["gap_after"], [(arrays["lam"] > 0, CLOSED, "closed contacts")]
     if allowed := record.get("allowed_gap"):
-        outlines.append(larger_than(allowed["allowed_mm"], gaps[1]))
+        outlines.append(larger_than(allowed["allowed_mm"], after))
+    gaps = ("gap before", arrays["gap_before"], ()), ("gap after", after, outlines)
     sides = [
         _pairs(name, (record, arrays), gap, rooted(f"{name}, mm", "viridis", gap), lines)
-        for name, gap, lines in zip(("gap before", "gap after"), gaps, ((), outlines), strict=True)
+        for name, gap, lines in gaps
     ]
     return map_sheet([item for pair in zip(*sides, strict=True) for item in pair], 2)[0]
 

@@ -37,19 +37,16 @@ def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure 
     )
     colours = ScalarMappable(Normalize(0.0, max(float(gap.max()), TINY)), colormaps["viridis"])
     look: dict[str, Any] = {"rcount": LINES, "ccount": LINES, "lw": 0.2, "clip_on": False}
-    with style.applied():
-        figure = style.figure(4.5)
-        figure.set_layout_engine("none")
-        axes: Any = figure.add_axes((0.0, 0.02, 0.85, 0.9), projection="3d")
-        sides = np.maximum((high - low) / (high - low).max(), NARROWEST)
-        axes.set_box_aspect((*sides, HEIGHT), zoom=1.2)
-        axes.view_init(azim=-60 if sides[0] >= sides[1] else -30)  # the longer side across the picture
-        axes.plot_surface(X, Y, first, color=style.GREY, **look)
-        axes.plot_surface(X, Y, first + between, facecolors=colours.to_rgba(between), alpha=0.8, **look)
-        axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="normal, mm")
-        axes.locator_params(nbins=4)
-        figure.suptitle(
-            f"{pair_name(seen.pair)}: at most {significant(gap.max())} mm apart", x=0.02, ha="left"
-        )
-        figure.colorbar(colours, cax=figure.add_axes((0.88, 0.25, 0.02, 0.5)), label="gap left, mm")
+    figure = style.figure(4.5)
+    figure.set_layout_engine("none")
+    axes: Any = figure.add_axes((0.0, 0.02, 0.85, 0.9), projection="3d")
+    sides = np.maximum((high - low) / (high - low).max(), NARROWEST)
+    axes.set_box_aspect((*sides, HEIGHT), zoom=1.2)
+    axes.view_init(azim=-60 if sides[0] >= sides[1] else -30)  # the longer side across the picture
+    axes.plot_surface(X, Y, first, color=style.GREY, **look)
+    axes.plot_surface(X, Y, first + between, facecolors=colours.to_rgba(between), alpha=0.8, **look)
+    axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="normal, mm")
+    axes.locator_params(nbins=4)
+    figure.suptitle(f"{pair_name(seen.pair)}: at most {significant(gap.max())} mm apart", x=0.02, ha="left")
+    figure.colorbar(colours, cax=figure.add_axes((0.88, 0.25, 0.02, 0.5)), label="gap left, mm")
     return figure

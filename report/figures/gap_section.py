@@ -29,18 +29,17 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
         f"along x at y = {significant(y[row])} mm": ("x, mm", x, row * len(x) + np.arange(len(x))),
         f"along y at x = {significant(x[column])} mm": ("y, mm", y, np.arange(len(y)) * len(x) + column),
     }
-    with style.applied():
-        figure = Figure(figsize=(style.WIDTH, 3.0))
-        node = np.argsort(place)
-        panels = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1), gridspec_kw=PLACE)
-        for axes, (title, (name, at, line)) in zip(panels, lines.items(), strict=True):
-            _draw(axes, at, {when: [face[node[line]] for face in both] for when, both in faces.items()})
-            axes.set(title=title, xlabel=name)
-        panels[0].set_ylabel("normal to the junction, mm")
-        names = pair["pair"] if len(pair["pair"]) == 2 else ["one side", "the other"]
-        handles, _ = panels[0].get_legend_handles_labels()
-        labels = [f"{names[0]}, after", f"{names[1]}, after", "gap left", "before"]
-        figure.legend(handles, labels, loc="lower left", ncols=4)
+    figure = Figure(figsize=(style.WIDTH, 3.0))
+    node = np.argsort(place)
+    panels = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1), gridspec_kw=PLACE)
+    for axes, (title, (name, at, line)) in zip(panels, lines.items(), strict=True):
+        _draw(axes, at, {when: [face[node[line]] for face in both] for when, both in faces.items()})
+        axes.set(title=title, xlabel=name)
+    panels[0].set_ylabel("normal to the junction, mm")
+    names = pair["pair"] if len(pair["pair"]) == 2 else ["one side", "the other"]
+    handles, _ = panels[0].get_legend_handles_labels()
+    labels = [f"{names[0]}, after", f"{names[1]}, after", "gap left", "before"]
+    figure.legend(handles, labels, loc="lower left", ncols=4)
     return figure
 
 

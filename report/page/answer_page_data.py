@@ -2,7 +2,9 @@
 
 import pandas as pd
 
+from report.document.blocks import number, word
 from report.document.numbers import (
+    as_number,
     coordinate,
     listed,
     out_of,
@@ -12,38 +14,35 @@ from report.document.numbers import (
     upwards,
     without_rounding,
 )
-from report.page.contact_maps import answer_maps, hover_names, map_controls, two_answers_maps
-from report.page.page_figures import map_item
-from report.page.page_file import Data, banner
+from report.page.contact_maps import answer_maps, map_view, two_answers_maps
+from report.page.page_file import Data, banner, table_data
 from report.results.answer_record import SavedAnswer, fasteners, pair_name, stages
 from report.results.series_results import Array
 
 CODE = ("machine", "commit", "clean", "recorded_at")
+#: The columns of a table of fasteners, but for their forces.
+FASTENER = [word("fastener", "kind"), word("contact", "contact")]
+FASTENER += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
+FORCE = number("force, N", "force_N")
 
 
 def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
     """The data of the page of one answer. record, arrays : from solution.json and solution.npz."""
-    forces = [
-        [kind, contact, coordinate(x), coordinate(y), significant(force)]
-        for kind, contact, x, y, force in fasteners(record).itertuples(index=False)
-    ]
-    table = {
-        "title": "Forces in the fasteners",
-        "summary": "",
-        "heads": ["kind", "contact", "x, mm", "y, mm", "force, N"],
-        "lines": forces,
-    }
     history = stage_lines(record, arrays)
     stages_table = {"title": "Stages", "summary": "", "heads": history[0], "lines": history[1:]}
     page = _with_maps([record], facts(record), answer_maps(record, arrays))
-    more = [*([stages_table] if history[1:] else []), *([table] if forces else [])]
+    more = [stages_table] if history[1:] else []
+    if len(forces := fasteners(record)):
+        more.append(table_data("Forces in the fasteners", [*FASTENER, FORCE], forces))
     return page | {"headline": headline(record, arrays), "tables": [*more, *page["tables"]]}
 
 
 def stage_lines(record: Data, arrays: dict[str, Array]) -> list[list[str]]:
     """The headings and the lines of the table of the stages; without stages, no line."""
     table = stages(record, arrays)
-    shown = table.map(lambda value: significant(value) if isinstance(value, float) else str(value))
+    shown = table.map(
+        lambda value: significant(value) if value is None or isinstance(value, float) else str(value)
+    )
     heads = [name.replace("_mm", " gap, mm") for name in shown.columns]
     return [heads, *shown.to_numpy().tolist()]
 
@@ -101,7 +100,8 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
     near = ", closer to the limit than the mesh can tell" if check.get("closer_than_grid_mm") else ""
     near += f"; {check['beyond_scan']}" if "beyond_scan" in check else ""
     if check["exceeded"] is None:
-        known = f"gaps are proven to {upwards(check['uncertainty_mm'])} mm"
+        proven = as_number(check["uncertainty_mm"])
+        known = f"gaps are proven to {upwards(proven)} mm" if proven is not None else "no error is proven"
         kind, verdict = "", f"CANNOT BE TOLD: {limit}, {known}"
     elif check["exceeded"]:
         larger = f"at {out_of(len(check['contacts']), record['m'], 'contact')}"
@@ -133,11 +133,7 @@ def _with_maps(records: list[Data], lines: list[list[str]], maps: Data) -> Data:
             for title, some in tables.items()
             if some
         ],
-        "views": [("maps", "Gap maps")] if maps["maps"] else [],
-        "controls": map_controls(maps),
-        "maps": maps,
-        "figures": {"map": map_item(hover_names(maps))},
-    }
+    } | map_view(maps)
 
 
 def _banner(records: list[Data]) -> Data:

@@ -11,7 +11,8 @@ import numpy as np
 
 from report.document.numbers import ROUNDING, counted
 from report.figures.node_cells import cells_of
-from report.page.page_file import Data, choice, entry, exact, packed
+from report.page.page_figures import map_item
+from report.page.page_file import Data, choice, exact, packed
 from report.results.answer_record import pair_name, stress_map
 from report.results.reader import Results
 from report.results.series_results import Array, Series
@@ -153,8 +154,15 @@ def map_controls(page: Data) -> list[Data]:
         choice("map", "map", [(k, made["name"]) for k, made in enumerate(page["maps"])], "maps"),
         choice("field", "show", [(name, name) for name in ordered], "maps"),
         choice("scale", "colours", [("linear", "linear"), ("log", "logarithmic")], "maps"),
-        *(entry(name, label, "maps") for name, label in COLOUR_ENTRIES.items()),
+        *({"name": name, "label": label, "views": "maps"} for name, label in COLOUR_ENTRIES.items()),
     ]
+
+
+def map_view(page: Data) -> Data:
+    """The view, the controls and the figure of a page that has maps alone."""
+    views = [("maps", "Gap maps")] if page["maps"] else []
+    figures = {"map": map_item(hover_names(page))}
+    return {"views": views, "controls": map_controls(page), "maps": page, "figures": figures}
 
 
 def hover_names(page: Data) -> list[str]:

@@ -43,33 +43,29 @@ def _kept(what: list[str], make: Callable[[], Any]) -> Any:
 
 
 def item(plot: figure, name: str) -> Any:
-    """A figure as JSON for `Bokeh.embed.embed_item`."""
-    return copies(plot, [name])[0]
-
-
-def copies(plot: figure, names: Iterable[str]) -> list[Any]:
-    """The JSON of a figure for each name.
+    """A figure as JSON for `Bokeh.embed.embed_item`.
 
     Bokeh numbers its models through the process; here they are numbered anew, behind a name, which differs
     among the figures of a page, so that equal data give equal pages.
     """
     from bokeh.embed import json_item
 
-    def renumbered(value: Any, name: str, numbers: dict[str, str]) -> Any:
+    numbers: dict[str, str] = {}
+
+    def renumbered(value: Any) -> Any:
         match value:
             case dict():
                 return {
                     key: numbers.setdefault(inner, f"{name}-{len(numbers)}")
                     if key in ("id", "root_id")
-                    else renumbered(inner, name, numbers)
+                    else renumbered(inner)
                     for key, inner in value.items()
                 }
             case list():
-                return [renumbered(inner, name, numbers) for inner in value]
+                return [renumbered(inner) for inner in value]
         return value
 
-    made = json_item(plot)
-    return [renumbered(made, name, {}) for name in names]
+    return renumbered(json_item(plot))
 
 
 def map_figure(names: Iterable[str]) -> figure:

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from report.analysis.checks import commits_text
+from report.document.blocks import Column, records
 from report.document.escape import plain, quoted, script_json, short
 from report.document.verdict_colours import FAIL, PASS
 from report.page.page_figures import scripts
@@ -60,9 +61,10 @@ def choice(name: str, label: str, options: Iterable[tuple[object, str]], views: 
     }
 
 
-def entry(name: str, label: str, views: str) -> Data:
-    """A field for a number above some views."""
-    return {"name": name, "label": label, "views": views}
+def table_data(title: str, columns: list[Column], data: pd.DataFrame, summary: str = "") -> Data:
+    """The data of a table, shown as in a report."""
+    lines = [[column.show(line) for column in columns] for line in records(data)]
+    return {"title": title, "summary": summary, "heads": [c.heading for c in columns], "lines": lines}
 
 
 def _named(directory: Path) -> str:

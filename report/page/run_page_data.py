@@ -23,7 +23,7 @@ from report.document.blocks import records
 from report.document.numbers import counted, listed
 from report.figures.style import line_styles
 from report.page.contact_maps import hover_names, map_controls, scene_maps
-from report.page.page_figures import PANELS, copies, map_item, precision_figure
+from report.page.page_figures import PANELS, item, map_item, precision_figure
 from report.page.page_file import Data, banner, column
 from report.page.run_page_controls import limit_slider, row_filters, ways_to_show
 from report.results.reader import Results
@@ -86,25 +86,17 @@ def run_data(results: Results) -> Data:
     limits = cells["limit_asked_mm"].dropna().mode()
     limit_mm = float(limits.iloc[0]) if len(limits) else LIMIT_MM
     ladders = [scene for scene in scenes if scene["ladder"]]
-    method_of = dict(zip(cells["label"], cells["method"], strict=True))
-    methods = list(dict.fromkeys(method_of[label] for label in (in_order(cells) if len(cells) else [])))
+    methods = in_order(cells, "method") if len(cells) else []
     filters = row_filters(cells)
-    views = {
-        "matrix": "Matrix",
-        "precision": "Work and precision",
-        "solver": "One solver",
-        "maps": "Gap maps",
-    }
-    if ladders:
-        views = {"ladders": "Ladders"} | views
-    if not maps["maps"]:
-        del views["maps"]
-    if not methods:
-        del views["solver"]
+    views = {"ladders": "Ladders"} if ladders else {}
+    views |= {"matrix": "Matrix", "precision": "Work and precision"}
+    views |= {"solver": "One solver"} if methods else {}
+    views |= {"maps": "Gap maps"} if maps["maps"] else {}
     ranges = [_range(cells, ["reached_mm"]), _range(cells, ["load_case_s", "total_s", "scene_s"])]
+    panel = precision_figure(*ranges)
     figures = {
         "map": map_item(hover_names(maps)),
-        "panels": copies(precision_figure(*ranges), [f"panel-{k}" for k in range(min(PANELS, len(scenes)))]),
+        "panels": [item(panel, f"panel-{k}") for k in range(min(PANELS, len(scenes)))],
     }
     return {
         "banner": _banner(results),

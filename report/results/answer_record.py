@@ -75,6 +75,11 @@ def stress_map(arrays: dict[str, Array], part: int) -> tuple[Array, Array, Any]:
     return arrays["stress_places"][here], values[here], arrays["stress_near_force"][here]
 
 
+def closed_contacts(lam: Array) -> int | None:
+    """The number of closed contacts; None if their forces are not known."""
+    return None if np.isnan(lam).any() else int((lam > 0).sum())
+
+
 def fasteners(record: dict[str, Any]) -> pd.DataFrame:
     """One line per fastener and contact."""
     lines = [

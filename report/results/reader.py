@@ -4,10 +4,8 @@
 repeats merged.
 """
 
-import json
 import re
 import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from harness.results import records
 from harness.results.schema import DRAWN, LADDERS, SPARSE
 from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
@@ -43,7 +42,6 @@ class Results:
     problems: pd.DataFrame
     suite: dict[str, Any] = field(default_factory=dict)
     machines: dict[str, dict[str, Any]] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
     left_out: int = 0  # rows of equal measurements, and of tolerances tried in a search for one
     rounds: pd.DataFrame = field(default_factory=lambda: frame([]))
     outdated: pd.DataFrame = field(default_factory=lambda: frame([]))
@@ -57,10 +55,6 @@ class Results:
             own = self.problems.loc[self.problems["scene"] == scenes[0], "title"].dropna()
             return f"{scenes[0]}: {own.iloc[-1]}" if len(own) and own.iloc[-1] else str(scenes[0])
         return str(self.suite.get("title") or "Results")
-
-    @property
-    def sizes(self) -> list[int]:
-        return sorted({int(n) for n in self.cells["n"].dropna()})
 
     @property
     def limit(self) -> str:
@@ -126,55 +120,25 @@ class Results:
 
 
 def read(directory: Path) -> Results:
-    """Read a directory. Raises FileNotFoundError if it has no measurements.jsonl; its other files may be
-    missing.
+    """Read a directory; damaged files have been refused by row_validation.py. Raises FileNotFoundError if it
+    has no measurements.jsonl; its other files may be missing.
     """
-    path = directory / "measurements.jsonl"
+    path = directory / records.MEASUREMENTS
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such file; a results directory holds measurements.jsonl")
-    records, warnings = _json_lines(path)
-    scenes, more = _json_lines(directory / "problems.jsonl")
-    old, _ = _json_lines(directory / "measurements.outdated.jsonl")
-    problems = pd.DataFrame(scenes)
-    suite = _loaded(directory / "suite.toml", tomllib.loads, more)
-    facts = [_loaded(file, json.loads, more) for file in sorted(directory.glob("machine*.json"))]
+    measured = quoted(records.read(path))
+    problems = pd.DataFrame(quoted(records.read(directory / "problems.jsonl")))
+    old = quoted(records.read(directory / records.OUTDATED))
+    plan = directory / "suite.toml"
+    suite = quoted(tomllib.loads(plan.read_text("utf-8-sig"))) if plan.is_file() else {}
+    facts = [quoted(records.parsed(file.read_bytes())) for file in sorted(directory.glob("machine*.json"))]
     machines = {str(fact.get("machine", "")): fact for fact in facts}
-    rows = frame(records)
+    rows = frame(measured)
     logs = map(plain, rows["log"])
     rows = rows.assign(
         log=[log if LOG.fullmatch(log) and (directory / log).is_file() else "" for log in logs]
     )
-    left_out, again = len(records) - len(rows), rows["round"] != ""
+    left_out, again = len(measured) - len(rows), rows["round"] != ""
     rows, rounds = (rows[of].reset_index(drop=True) for of in (~again, again))
-    read = rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out
+    read = rows, cells_of(rows), problems, suite, machines, left_out
     return Results(directory, *read, rounds, frame(old, [*VERSION, "scene_key"]))
-
-
-def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dict[str, Any]:
-    """The content of a file; empty if there is none, and with a warning if it is damaged."""
-    try:
-        content = quoted(parse(path.read_text("utf-8"))) if path.is_file() else {}
-    except (ValueError, RecursionError):
-        content = None
-    if isinstance(content, dict):
-        return content
-    warnings.append(f"{path.name} could not be read and is ignored.")
-    return {}
-
-
-def _json_lines(path: Path) -> tuple[list[dict[str, Any]], list[str]]:
-    records: list[dict[str, Any]] = []
-    warnings: list[str] = []
-    lines = path.read_text("utf-8", "replace").split("\n") if path.is_file() else []
-    for number, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
-        try:
-            record = quoted(json.loads(line))
-        except (ValueError, RecursionError):
-            record = None
-        if isinstance(record, dict):
-            records.append(record)
-        else:
-            warnings.append(f"{path.name}, line {number}, could not be read and is ignored.")
-    return records, warnings

@@ -75,34 +75,27 @@ class Series:
 def read(directory: Path) -> Series:
     """Read a directory. Raises InputError if its file is damaged."""
     facts = quoted(series_file.read_facts(directory))
-    count = facts["cases"]  # an earlier, longer series may have left others
-    rows: dict[int, tuple[Any, ...] | None] = {}
-    verdicts: dict[int, str] = {}
+    verdicts: Counter[str] = Counter()
     swept: list[str] = []
-    code: dict[int, tuple[str, bool | None]] = {}
-    forces: dict[int, list[float]] = {}
+    code: list[list[str | bool | None]] = []
+    kept: list[tuple[Any, ...]] = []
+    forces: list[list[float]] = []
     for row in series_file.rows(directory):
-        case = row["case"]
-        if case >= count:
-            continue
-        verdicts[case], rows[case] = row["verdict"], None
-        code[case] = row.get("commit") or "", row.get("clean")
+        verdicts[row["verdict"]] += 1
+        code.append([row.get("commit") or "", row.get("clean")])
         if row.get("max_gap_mm") is not None:
             swept = swept or [key for key in row if "." in key and not facts.get("random_inputs")]
-            rows[case] = (case, *(row.get(name) for name in FIGURES), *(row[key] for key in swept))
-            forces[case] = row.get("fastener_forces_N", [])
-    kept = [row for row in rows.values() if row]
+            figures = (row.get(name) for name in FIGURES)
+            kept.append((row["case"], *figures, *(row[key] for key in swept)))
+            forces.append(row.get("fastener_forces_N", []))
     swept = quoted(swept)
-    cases = pd.DataFrame(kept, columns=["case", *FIGURES, *swept], dtype=float)
-    cases = cases.astype({"case": int}).sort_values("case").reset_index(drop=True)
+    cases = pd.DataFrame(kept, columns=["case", *FIGURES, *swept], dtype=float).astype({"case": int})
     contacts = series_file.read_contacts(directory)
     nodes, fasteners = contacts.get("contact_nodes"), contacts.get("fasteners", np.zeros((0, 2)))
     gaps = series_file.StoredGaps(directory, int(contacts["m"]))
-    made = pd.DataFrame(quoted(list(map(list, code.values()))), columns=["commit", "clean"])
-    shape = len(cases), len(next(iter(forces.values()), ()))
-    tension = np.array([forces[case] for case in cases["case"]], dtype=float).reshape(shape)
-    counts = quoted(Counter(verdicts.values()))
-    return Series(facts, counts, cases, gaps, nodes, fasteners, swept, made, tension)
+    made = pd.DataFrame(quoted(code), columns=["commit", "clean"])
+    tension = np.array(forces, dtype=float).reshape(len(forces), len(forces[0]) if forces else 0)
+    return Series(facts, quoted(verdicts), cases, gaps, nodes, fasteners, swept, made, tension)
 
 
 def quantile_maps(series: Series) -> Array:

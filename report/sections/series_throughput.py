@@ -27,7 +27,7 @@ def section(results: Results) -> Section | None:
     lines = groups[["n", "searched", "owner"]].first().assign(cases=groups.size())
     lines["within"] = groups["within"].sum()
     lines["case_s"] = groups["later_s"].median()
-    lines["once_s"] = groups[["convert_s", "prepare_s"]].max().sum(axis=1)
+    lines["once_s"] = groups[["convert_s", "prepare_s"]].max().sum(axis=1, min_count=1)
     lines["first_s"] = groups["first_s"].median()
     lines[["batched", "error_mm"]] = groups[["batched", "error_mm"]].max()
     lines = lines.join(spreads(rows, CELL, ["to_library"])).reset_index()

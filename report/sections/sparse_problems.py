@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import SPARSE
+from report.analysis.standings import NOT_RUN
 from report.document.blocks import Column, Section, Table, number, word
 from report.document.numbers import significant, whole
 from report.results.reader import Results
@@ -24,14 +25,16 @@ def section(results: Results) -> Section | None:
     if ours.empty:
         return None
     within = cells[cells["verdict"] == "within"]
-    library = within[within["owner"] == "library"].groupby("scene")["total_s"].min()
+    libraries = cells[(cells["owner"] == "library") & ~cells["status"].isin(NOT_RUN)]
+    seconds = libraries["total_s"].where(libraries["verdict"] == "within", INF)
+    library = seconds.groupby(libraries["scene"]).min()
     solved = within[within["status"] == "solved"].groupby(["method", "scene"])["total_s"].min()
     lines: list[dict[str, Any]] = []
     for method in in_order(ours, "method"):
         scenes = ours.loc[ours["method"] == method, "scene"].drop_duplicates()
         frame = pd.DataFrame({"seconds": [solved.get((method, scene), INF) for scene in scenes]})
-        frame["times"] = frame["seconds"] / [library.get(scene, INF) for scene in scenes]
-        frame["times"] = frame["times"].fillna(INF)  # neither has an answer
+        times = frame["seconds"] / [library.get(scene, np.nan) for scene in scenes]
+        frame["times"] = times.where(frame["seconds"] < INF, INF)
         frame["problems"] = [scene.removeprefix(SPARSE).rpartition("-")[0] for scene in scenes]
         kinds = [_figures(kind) for _, kind in frame.groupby("problems", sort=False)]
         every = _figures(frame) | {"problems": "all", "slowest": max(line["slowest"] for line in kinds)}
@@ -46,7 +49,8 @@ def section(results: Results) -> Section | None:
     ]
     caption = (
         f"*Sparse problems, beside the fastest library within {results.limit}*, preparation included; ∞: not "
-        "solved, or not within; 0: no library is within. In the line of all, slowest / median is the largest."
+        "solved, or not within; 0: no library is within, –: none was run. In the line of all, slowest / "
+        "median is the largest."
     )
     return Section("Sparse problems", [Table("sparse", caption, pd.DataFrame(lines), columns, keys=2)])
 

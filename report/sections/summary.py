@@ -44,7 +44,7 @@ def advice(results: Results) -> Section | None:
         (FROM_SCENE, cells_by_stage, "total_1_s"),
     ]
     lines, sweep = [], cells_of_curves(results)
-    for n in results.sizes:
+    for n in sorted(cells["n"].dropna().unique()):
         limit = cells.loc[cells["n"] == n, "limit_mm"].max()
         for what, among, seconds in counted:
             if len(of_size := among[among["n"] == n]):
@@ -92,7 +92,8 @@ def summary(results: Results) -> Section | None:
     if table["cannot_be_judged"].any():
         columns.append(number("cannot be judged", "cannot_be_judged", whole))
     columns.append(number("worst error, mm", "worst_error_mm", power))
-    columns += [number(f"s per load case, n = {n}", f"load_case_s_{n}") for n in results.sizes]
+    sizes = [name for name in table.columns if name.startswith("load_case_s_")]
+    columns += [number(name.replace("load_case_s_", "s per load case, n = "), name) for name in sizes]
     columns.append(number("shifted geometric mean, s", "shifted_mean_s"))
     blocks: list[Block] = []
     if len(drawn):

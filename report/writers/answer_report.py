@@ -11,12 +11,13 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
-from report.document.numbers import coordinate, extent, raised, significant, whole
+from report.document.numbers import extent, raised, significant, whole
 from report.figures.answer_maps import answer_figures
 from report.figures.node_cells import grid_of
-from report.page.answer_page_data import answer_data, facts, headline
+from report.page.answer_page_data import FASTENER, FORCE, answer_data, facts, headline
 from report.page.page_file import write as write_page
 from report.results.answer_record import (
+    closed_contacts,
     contacts,
     fasteners,
     nodes,
@@ -122,16 +123,13 @@ def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
     """The forces in the fasteners, and the ranges of the fields in each pair and part."""
     blocks: list[Block] = []
     if len(forces := fasteners(record)):
-        columns = [word("fastener", "kind"), word("contact", "contact")]
-        columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
-        columns.append(number("force, N", "force_N"))
-        blocks.append(Table("fasteners", "*The force in each fastener.*", forces, columns))
+        blocks.append(Table("fasteners", "*The force in each fastener.*", forces, [*FASTENER, FORCE]))
     pairs = []
     for pair in record["pairs"]:
         here = slice(pair["start"], pair["stop"])
         line = {name: arrays[name][here] for name in ("gap_before", "gap_after", "lam")}
-        closed = f"{(line['lam'] > 0).sum()} of {len(line['lam'])}"
-        pairs.append(line | {"contact": pair_name(pair), "closed": closed, "force_N": np.nansum(line["lam"])})
+        closed = f"{whole(closed_contacts(line['lam']))} of {len(line['lam'])}"
+        pairs.append(line | {"contact": pair_name(pair), "closed": closed, "force_N": line["lam"].sum()})
     if pairs:
         columns = [word("contact", "contact"), _range("gap before, mm", "gap_before")]
         columns += [_range("gap after, mm", "gap_after"), word("closed", "closed")]

@@ -10,10 +10,10 @@ import pandas as pd
 
 from report.analysis.checks import commits_text
 from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
-from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
+from report.document.blocks import Block, Column, Section, Table, Text, number, word
 from report.document.escape import file_name
 from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
-from report.page.page_file import Data, banner
+from report.page.page_file import Data, banner, table_data
 from report.page.page_file import write as write_page
 from report.writers.sections_writer import written
 
@@ -117,13 +117,7 @@ def comparison_data(comparisons: list[Comparison]) -> Data:
     return {
         "banner": _banner(pd.concat([pair.rows for pair in comparisons])),
         "tables": [
-            {
-                "title": f"{pair.old} → {pair.new}",
-                "summary": pair.summary,
-                "heads": [column.heading for column in COLUMNS],
-                "lines": [[str(column.show(line)) for column in COLUMNS] for line in records(pair.table)],
-            }
-            for pair in comparisons
+            table_data(f"{pair.old} → {pair.new}", COLUMNS, pair.table, pair.summary) for pair in comparisons
         ],
     }
 

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import coordinate, counted, out_of, significant, whole
+from report.document.numbers import coordinate, counted, out_of, raised, significant, whole
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.results.series_results import read as read_series
@@ -52,7 +52,7 @@ def _sheet(record: dict[str, Any], title: str, directory: Path) -> Sheet:
     solved = read_series(directory / ("plan" if best else "own"))
     facts = _summary(record).data.set_index("what")["value"]
     samples = [f"{name}: {text}." for name, text in facts.items() if ", round" in str(name)]
-    sure = [exactness(float(solved.cases["gap_error_mm"].max())), *samples, MESH]
+    sure = [exactness(solved.cases["gap_error_mm"].max(skipna=False)), *samples, MESH]
     picture = directory / "report" / "before-and-after.png"
     about = origin(record), record.get("inputs", {}), [picture] if picture.exists() else []
     tables = [block for block in _order(record) if isinstance(block, Table)] if record["order"] else []
@@ -99,7 +99,8 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
             most = plans[plans["fasteners"] == plans["fasteners"].max()]
             line = (kept if len(kept) else most).iloc[0]
             lines.append({"family": text, **line[["fasteners", "gap_mm"]], "kept": line["gap_mm"] <= limit})
-    columns = [word("plan", "family"), number("fasteners", "fasteners", whole), number("gap, mm", "gap_mm")]
+    columns = [word("plan", "family"), number("fasteners", "fasteners", whole)]
+    columns.append(number("gap, mm", "gap_mm", lambda gap: significant(raised(gap))))
     if record["limit_mm"] is not None:
         columns.append(Column("within the limit", lambda line: "yes" if line["kept"] else "no", "left"))
     caption = (
@@ -138,12 +139,15 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
         names["plan"] = f"the plan of {record['best']['fasteners']}"
     for name, text in names.items():
         series = read_series(directory / name)
+        count = series.facts["cases"]
         if record["samples"]:
-            fresh = series.cases["case"].isin(record["samples"][-1]["numbers"])
-            series = replace(series, cases=series.cases[fresh])
-        if series.nodes is None or not len(series.cases):
+            numbers = record["samples"][-1]["numbers"]
+            count = len(numbers)
+            series = replace(series, cases=series.cases[series.cases["case"].isin(numbers)])
+        of_answered = share * (count - 1) / max(len(series.cases) - 1, 1)  # without an answer: the largest
+        if series.nodes is None or not len(series.cases) or of_answered > 1:
             return [Text("No picture: some cases have no answer.")]
-        pieces = [np.quantile(some, share, axis=0) for some in series.of_contacts()]
+        pieces = [np.quantile(some, of_answered, axis=0) for some in series.of_contacts()]
         shown.append((text, series.nodes, np.concatenate(pieces), series.marks))
     scale = rooted("gap, mm", "viridis", *(values for _, _, values, _ in shown))
     limit = np.inf if record["limit_mm"] is None else record["limit_mm"]

@@ -13,8 +13,8 @@ from report.document.escape import file_name
 from report.document.numbers import counted, out_of, raised, significant, tidy_power
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
-from report.page.contact_maps import hover_names, map_controls, series_maps
-from report.page.page_figures import exceedance_figure, item, map_item
+from report.page.contact_maps import map_view, series_maps
+from report.page.page_figures import exceedance_figure, item
 from report.page.page_file import Data, banner
 from report.page.page_file import write as write_page
 from report.results.series_results import (
@@ -57,7 +57,7 @@ def write(directory: Path) -> Path:
             figures = [*_maps(series, maps), _exceedance(curve, len(series.cases)), *spread]
             blocks = [*figures, *contributors_of(series), _statistics(series)]
         sections.append(Section("The remaining gap", blocks))
-        data = series_data(series, maps, [*PERCENT.values(), "mean"], curve)
+        data = series_data(series, maps, curve)
     target = emptied(directory / "report")
     if data:
         write_page(target / "index.html", title, data)
@@ -70,7 +70,7 @@ def write(directory: Path) -> Path:
 def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
     facts, check = series.facts, series.facts.get("allowed_gap") or {"kind": "", "said": []}
     *sure, verdict = check["said"] or [f"The largest gap left is {_largest(series)}."]
-    sure = [exactness(float(series.cases["gap_error_mm"].max())), *sure, MESH]
+    sure = [exactness(series.cases["gap_error_mm"].max(skipna=False)), *sure, MESH]
     allowed = [directory / "allowed-gap.png"] if check["said"] else []
     pictures = [*allowed, target / "worst-case.png", target / "quantile-maps.png"]
     record = facts | {
@@ -131,11 +131,8 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
         return []
     case = int(series.cases["case"].iloc[series.cases["max_gap_mm"].to_numpy().argmax()])
     gap = np.asarray(series.gaps[case], dtype=float)
-    places = pd.DataFrame({"x_mm": nodes[:, 0], "y_mm": nodes[:, 1]})
-    values = {
-        **{f"q{q:g}_mm": values for q, values in zip(QUANTILES, maps, strict=False)},
-        "mean_mm": maps[-1],
-    }
+    places = pd.DataFrame(nodes[:, :2], columns=["x_mm", "y_mm"])
+    values = dict(zip([*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"], maps, strict=True))
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
     quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
     limit = larger_than((series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf), gap)
@@ -188,7 +185,7 @@ def _swept(series: Series, key: str) -> Figure:
     axes.set(xlabel=key, ylabel="remaining gap, mm")
     drawing.legend(loc="outside right upper")
     caption = f"*The largest and the mean gap per case against {key}*, shaded: the range over the other keys."
-    error = 2 * series.cases["gap_error_mm"].astype(float).max()  # NaN if one is unknown
+    error = 2 * series.cases["gap_error_mm"].astype(float).max(skipna=False)  # NaN if one is unknown
     if np.ptp(ranges[[f"{name}_{end}" for name in GAPS for end in ("min", "max")]], axis=0).max() <= error:
         caption += (
             f" **{key} changes neither**, to what is proven: closed contacts carry the difference, or it "
@@ -202,14 +199,11 @@ def _axes() -> tuple[Drawing, Axes]:
     return drawing, drawing.subplots()
 
 
-def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.DataFrame) -> Data:
-    """The data of the page. quantiles : (len(names), m), mm, the maps; curve : of
-    `series_results.exceedance`.
-    """
+def series_data(series: Series, quantiles: Array, curve: pd.DataFrame) -> Data:
+    """The data of the page. quantiles, curve : of `quantile_maps` and `exceedance` of series_results."""
     facts = series.facts
     versions = facts.get("versions") or {}
     identity = facts["identity"]
-    maps = series_maps(series, quantiles, names)
     gaps = curve["gap_mm"].to_numpy()
     curves = {text: (gaps, 100 * curve[key].to_numpy()) for key, text in CURVES.items()}
     rows = series.code.assign(
@@ -218,9 +212,10 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
         solver=identity["solver"],
         solver_code=identity.get("solver_code") or "",
     )
-    rows["clean"] = rows["clean"].astype(float)
     check = facts.get("allowed_gap")
-    return {
+    page = map_view(series_maps(series, quantiles, [*PERCENT.values(), "mean"]))
+    page["figures"]["curves"] = item(exceedance_figure(curves), "curves")
+    return page | {
         "headline": {"kind": check["kind"], "text": " ".join(check["said"][::-1])} if check else None,
         "banner": banner(
             rows,
@@ -228,11 +223,4 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
             counts=f"{out_of(len(series.cases), facts['cases'], 'load case')} answered",
             versions=[f"{name} {version}" for name, version in versions.items()],
         ),
-        "views": [("maps", "Gap maps")] if maps["maps"] else [],
-        "controls": map_controls(maps),
-        "maps": maps,
-        "figures": {
-            "map": map_item(hover_names(maps)),
-            "curves": item(exceedance_figure(curves), "curves"),
-        },
     }

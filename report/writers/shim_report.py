@@ -14,11 +14,11 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Polygon, Rectangle
 
-from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, records, word
-from report.document.escape import plain, quoted
-from report.document.numbers import counted, significant, whole
+from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, word
+from report.document.escape import quoted
+from report.document.numbers import counted, raised, significant, whole
 from report.figures import style
-from report.page.page_file import Data, banner
+from report.page.page_file import Data, banner, table_data
 from report.page.page_file import write as write_page
 from report.writers.sections_writer import written
 from report.writers.sheet import Sheet, origin, write_sheet
@@ -76,8 +76,8 @@ def write(directory: Path) -> Path:
     kind, picture = record["said"].partition(":")[0].lower(), directory / "shims.png"
     code = pd.DataFrame([record])[["machine", "commit", "clean", "recorded_at"]]
     data: Data = {
-        "headline": {"kind": kind, "text": plain(record["said"])},
-        "banner": banner(code, f"scene {plain(record['scene'])}", warnings=[]),
+        "headline": {"kind": kind, "text": record["said"]},
+        "banner": banner(code, f"scene {record['scene']}", warnings=[]),
         "pictures": [f"data:image/png;base64,{b64encode(picture.read_bytes()).decode()}"],
         "tables": [_on_page(table) for table in (facts, *tables)],
     }
@@ -109,7 +109,7 @@ def _largest(record: dict[str, Any], key: str, shims: int) -> str:
     unit, name = LIMITS[key]
     if record[name] is None:
         return ""
-    before, after = (f"{significant(record[when][key])} {unit}" for when in ("before", "after"))
+    before, after = (f"{significant(raised(record[when][key]))} {unit}" for when in ("before", "after"))
     chose, fresh = (" in the cases that chose", " in the fresh cases") if record["samples"] else ("", "")
     at = f", at {record['worst_at']}" if key == "gap" else ""
     if shims:
@@ -140,9 +140,7 @@ def _stock(pieces: pd.DataFrame, sizes: list[str]) -> list[Block]:
 
 def _on_page(table: Table) -> Data:
     _, title, summary = table.caption.split("*", 2)
-    lines = [[plain(column.show(line)) for column in table.columns] for line in records(table.data)]
-    heads = [column.heading for column in table.columns]
-    return {"title": title.rstrip("."), "summary": summary.strip("; "), "heads": heads, "lines": lines}
+    return table_data(title.rstrip("."), table.columns, table.data, summary.strip("; "))
 
 
 def _range(axis: str, line: Mapping[str, Any]) -> str:

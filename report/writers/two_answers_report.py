@@ -10,11 +10,11 @@ import scipy.sparse as sp
 
 from harness.results.schema import EXCEEDED
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
-from report.document.numbers import coordinate, counted, position, significant, whole
+from report.document.numbers import counted, position, significant, whole
 from report.figures.answer_maps import gap_maps
-from report.page.answer_page_data import headline, two_answers_data
+from report.page.answer_page_data import FASTENER, headline, two_answers_data
 from report.page.page_file import write as write_page
-from report.results.answer_record import SavedAnswer, contacts, fasteners, pair_name, read
+from report.results.answer_record import SavedAnswer, closed_contacts, contacts, fasteners, pair_name, read
 from report.writers.sections_writer import written
 
 SIDES = ("first", "second")
@@ -56,9 +56,7 @@ def write(
         blocks += [Figure(name, CAPTIONS[name], made) for name, made in maps.items()]
     forces = _fasteners([first, second])
     if len(forces):
-        columns = [word("kind", "kind"), word("contact", "contact")]
-        columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
-        columns += [*(number(side, f"{side}_N") for side in SIDES)]
+        columns = [*FASTENER, *(number(side, f"{side}_N") for side in SIDES)]
         blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", forces, columns))
     title = f"{names[0]} and {names[1]}"
     write_page(directory / "index.html", title, two_answers_data(answers, common))
@@ -104,8 +102,8 @@ def _pair(both: Sequence[dict[str, Any]], answers: list[SavedAnswer], table: pd.
             f"initial_{side}_mm": arrays["gap_before"][here].max(),
             f"largest_{side}_mm": gap.max(),
             f"mean_{side}_mm": gap.mean(),
-            f"closed_{side}": int((force > 0).sum()),
-            f"force_{side}_N": float(np.nansum(force)),
+            f"closed_{side}": closed_contacts(force),
+            f"force_{side}_N": float(force.sum()),
         }
     change = table.loc[table["contact"] == line["contact"], "change_mm"]
     closed, opened = (np.maximum(0.0, most) + 0.0 for most in (-change.min(), change.max()))  # no -0

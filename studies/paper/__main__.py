@@ -6,10 +6,11 @@ import sys
 from pathlib import Path
 
 from report.figures import style
+from report.results.reader import read
 from report.writers.sections_writer import emptied, written
 
 from . import claims, figures5_7, table3, tables
-from .rows import study
+from .rows import study_of
 
 TITLE = "The paper's claims, tables and figures, beside its published numbers"
 
@@ -25,7 +26,7 @@ SECTIONS = (
 
 def write(directory: Path) -> Path:
     """Returns the path of the page. Raises FileNotFoundError, ValueError."""
-    found = study(directory)
+    found = study_of(read(directory))
     with style.applied():
         made = [section(found) for section in SECTIONS]
     target = emptied(directory / "study", "study.md") / "study.md"

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -14,7 +13,7 @@ import pandas as pd
 from report.analysis.standings import TIE, seconds_text
 from report.document.blocks import Column, Table
 from report.document.numbers import as_number, significant
-from report.results.reader import Results, read
+from report.results.reader import Results
 
 Row = dict[str, Any]
 ByScene = dict[str, Row]
@@ -93,12 +92,8 @@ def timed(cells: pd.DataFrame) -> pd.DataFrame:
     return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
 
 
-def study(directory: Path) -> Study:
-    """Raises FileNotFoundError if DIRECTORY has no rows, ValueError if several machines made them."""
-    return study_of(read(directory))
-
-
 def study_of(results: Results) -> Study:
+    """Raises ValueError if several machines made the rows."""
     if results.rows["machine"].nunique() > 1:
         raise ValueError(f"{results.directory}: times of several machines cannot be compared")
     cells = timed(results.cells[results.cells["status"] != "unsupported"])

@@ -49,11 +49,12 @@ def quantities(study: Study) -> list[Row]:
     for row in study.scaling:
         if row["method"] in METHODS:
             steps = [row["prepare_s"], *map(build.get(row["scene"], {}).get, ("cholesky", "Q"))]
-            names = ("load_case_s", "solve_s", "iterations", "inner_iterations")
-            seconds, solve, outer, cg = ((row["verdict"] == "within" and row[k]) or math.nan for k in names)
+            names = ("load_case_s", "solve_s", "iterations", "inner_iterations", "working_mib")
+            known = ((row["verdict"] == "within" and row[name]) or math.nan for name in names)
+            seconds, solve, outer, cg, memory = known
             line = {name: row[name] for name in ("n", "active", "method")}
             line |= {PREPARATION: math.nan if None in steps else sum(steps), OWN: row["prepare_s"]}
-            line |= {WORKING: seconds, "shown": row["shown"], MEMORY: row["working_mib"]}
+            line |= {WORKING: seconds, "shown": row["shown"], MEMORY: memory}
             if row["solver"] == "ipm":
                 line |= {OUTER: outer, CG: cg, PER_CG: solve / cg, PER_SYSTEM: 2 * seconds * outer / cg}
             else:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from clopper_pearson import interval_of
 from commands import harness
 from sample_size import draws
-from scipy.stats import binomtest
 from small_problems import solve_by_nnls
 from strip_scene import write_strip
 
@@ -160,7 +160,7 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     done = harness(*command, "--allow-gap", allowed, "--out", tmp_path)
     assert done.exit_code == 4, done.output
     assert f"in 5 of {CASES} cases" in done.stdout
-    low, high = binomtest(CASES - 5, CASES).proportion_ci(0.95, "wilson")
+    low, high = interval_of(CASES - 5, CASES)
     assert f"Surely within {allowed:g} mm: {CASES - 5} of {CASES} cases" in done.stdout
     assert f"between {low:.2%} and {high:.2%}" in done.stdout
     assert f"at {larger.any(axis=0).sum()} of {gaps.shape[1]} contacts" in done.stdout
@@ -182,6 +182,7 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     assert (unjudged.exit_code, f"{CASES} cannot be judged" in unjudged.stdout) == (4, True)
 
 
+@pytest.mark.usefixtures("without_report")
 def test_a_case_without_an_answer_is_in_the_verdict(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     """It cannot pass; what the others show is said all the same."""
     command = ("series", gap[0], "--cases", CASES, "--check", 0, "--threads", 1, "--out", tmp_path)
@@ -192,7 +193,7 @@ def test_a_case_without_an_answer_is_in_the_verdict(gap: tuple[Path, np.ndarray]
     done = harness(*command, "--allow-gap", 9.0)
     assert done.exit_code == 1
     assert f"Surely within 9 mm: {CASES - 1} of {CASES} cases" in done.stdout
-    low = binomtest(CASES - 1, CASES).proportion_ci(0.95, "wilson").low
+    low, _ = interval_of(CASES - 1, CASES)
     assert f"between {low:.2%} and 100.00%" in done.stdout
     assert (
         f"In 1 of {CASES} cases it cannot be told whether a gap is larger than 9 mm: there is no"
@@ -205,6 +206,7 @@ def test_a_case_without_an_answer_is_in_the_verdict(gap: tuple[Path, np.ndarray]
     assert f"FAIL: the gap is larger than 0.001 mm in {CASES - 1} of {CASES} cases" in done.stdout
 
 
+@pytest.mark.usefixtures("without_report")
 def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     swept = ("--sweep", "initial_gap.mean=0.1,0.2", "--check", 0, "--threads", 1, "--allow-gap", 9.0)
     done = harness("series", gap[0], *swept, "--out", tmp_path)
@@ -212,6 +214,7 @@ def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: 
     assert "Surely within 9 mm: 2 of 2 cases.\n" in done.stdout
 
 
+@pytest.mark.usefixtures("without_report")
 def test_a_series_without_errors_of_gaps_cannot_be_told(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     command = ("series", gap[0], "--cases", 3, "--check", 0, "--threads", 1, "--out", tmp_path)
     assert harness(*command).exit_code == 0

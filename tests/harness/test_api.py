@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+import tiny_joint
 from small_problems import make_load, make_prepared, solve_by_nnls
 from strip_scene import STRIP, write_strip
 
@@ -28,6 +29,7 @@ from harness import (
     solve_dual,
     solve_series,
 )
+from harness.series.session import Job
 from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
@@ -61,6 +63,8 @@ def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> N
     gap, fasteners, *others = table["effect"]
     effects = (gap, Fasteners.model_validate(fasteners), *others)
     scenes.append(load_scene({"joint": Joint.model_validate(table["joint"]), "effect": effects}))
+    gap["random"]["seed"] = np.int64(gap["random"]["seed"])
+    scenes.append(load_scene(table))
     assert len({scene.key for scene in scenes}) == 1
     assert load_scene(scenes[0]) is scenes[0]
 
@@ -74,6 +78,7 @@ def test_every_function_takes_a_scene_as_an_object_or_a_dict(tmp_path: Path) -> 
         harness.export(source, tmp_path / f"{n}.npz", format="npz") for n, source in enumerate(sources)
     ]
     assert len({load_scene(path).key for path in written}) == 1
+    assert harness.import_matrices(written[0], tmp_path / "again.npz").exists()
     sweep: Any = {"sweep": ["initial_gap.mean=0.4,0.5"], "options": harness.SeriesOptions(check=0)}
     done = [harness.run_series(source, tmp_path / f"{n}", **sweep) for n, source in enumerate(sources)]
     assert len({tuple(row["max_gap_mm"] for row in one.rows) for one in done}) == 1
@@ -96,7 +101,8 @@ def test_load_cases_have_paths_or_texts_and_possible_numbers(tmp_path: Path) -> 
         with pytest.raises(InputError) as caught:
             harness.run_series(scene, tmp_path / "none", wrong)
         assert [fault.where for fault in caught.value.faults] == ["--cases", "--seed"]
-    assert not GapCases(count=np.int64(2), seed=np.int64(0)).faults()  # type: ignore[arg-type]
+    pair = [GapCases(2, 3), GapCases(np.int64(2), np.int64(3))]  # type: ignore[arg-type]
+    assert len({cases.of(scene, "dual").key for cases in pair}) == 1
 
 
 def test_all_faults_of_a_dict_are_named() -> None:
@@ -160,6 +166,8 @@ def test_plain_arrays_are_copied_and_checked() -> None:
         ((Q + np.triu(np.ones_like(Q), 1), p), "symmetric"),
         ((-Q, p), "positive definite"),
         ((Q * np.nan, p), "finite"),
+        ((Q * (1 + 1j), p), "must be real numbers"),
+        ((Q, p * (1 + 1j)), "must be real numbers"),
     ):
         with pytest.raises(InputError, match=said):
             solve_dual(*bad)
@@ -204,6 +212,49 @@ def test_a_solver_object_is_judged_and_its_nonsense_named() -> None:
         solve(scene, Idle(status="failed"))
     with pytest.raises(InputError, match="has its options already"):
         solve(scene, Idle(), options={"lam": None})
+    with pytest.raises(InputError, match=r"an object of it: Idle\(\)"):
+        solve(scene, Idle)  # type: ignore[arg-type]
+
+
+def test_an_answer_that_is_changed_leaves_the_reference() -> None:
+    answer = solve(own_matrices(*matrices()[2]))
+    x, lam = answer.x, answer.problem.reference.lam.copy()
+    answer.x[:] = 1.0
+    answer.lam[:] = 1.0
+    np.testing.assert_array_equal(answer.x, x)
+    np.testing.assert_array_equal(answer.problem.reference.lam, lam)
+
+
+def test_a_scene_is_that_of_the_folder_where_it_was_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though another one has a file of that name."""
+    for name, f in (("there", 2.0), ("here", 1.0)):
+        (tmp_path / name).mkdir()
+        np.savez(tmp_path / name / "own.npz", K=np.eye(1), A=np.eye(1), f=[f], g=[9.0])
+    monkeypatch.chdir(tmp_path / "here")
+    scene = load_scene("own.npz")
+    monkeypatch.chdir(tmp_path / "there")
+    assert solve(scene).x == pytest.approx([1.0])
+
+
+def test_the_plugin_of_a_series_is_a_text_or_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where workers find it, too. Matrices in memory cannot be sent to its process."""
+    jobs: list[Job] = []
+
+    def run(job: Job, *of: Any) -> int:
+        jobs.append(job)
+        return 0
+
+    monkeypatch.setattr("harness.commands.load_case_series.run", run)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "exact.py").write_text(tiny_joint.EXACT)
+    options = harness.SeriesOptions(solver="exact", plugin="exact.py")
+    strip, few = write_strip(tmp_path), GapCases(count=1)
+    harness.run_series(strip, "out", few, options, report=False)
+    assert jobs[0].plugin == tmp_path / "exact.py"
+    with pytest.raises(InputError, match=r"--plugin: scene = .*`export` makes one"):
+        harness.run_series(own_matrices(*matrices()[2]), "out", few, options)
 
 
 @pytest.mark.parametrize(("solver", "form"), [("newton", "dual"), ("gi", "dual"), ("gi", "primal")])
@@ -225,6 +276,8 @@ def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
 def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load_scene(tomllib.loads(STRIP))
     gaps = [results.gap for results in solve_series(scene, random_gaps(scene, 2, seed=5))]
+    with pytest.raises(InputError, match=r"case 0: f\.shape"):
+        solve_series(scene, random_gaps(scene, 2, seed=5), form="sparse")  # made for the dual form
     load = load_case(scene, "sparse")
     x = reference_of(scene, prepared(scene, form="sparse"), load).x
     monkeypatch.setattr(JointModel, "dense", lambda *given: pytest.fail("condensed"))

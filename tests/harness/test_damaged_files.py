@@ -185,9 +185,10 @@ def test_a_reader_is_waited_for_and_then_named(tmp_path: Path, monkeypatch: pyte
     assert list(series_file.rows(tmp_path)) == [row]
 
 
-def test_fewer_cases_are_reported_as_that_many(series: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("blank_pictures")
+def test_fewer_cases_are_reported_as_that_many(solved: Path, tmp_path: Path) -> None:
     """The rows of the other cases stay, for a longer series."""
-    monkeypatch.undo()
+    series = Path(shutil.copytree(solved, tmp_path / "copy")) / "out"
     facts = series_file.read_facts(series) or {}
     series_file.write_fact(series, "series", json.dumps(facts | {"cases": 4}))
     assert harness("report", series).exit_code == 0
@@ -202,6 +203,7 @@ def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, copy
     assert f"measurements.jsonl: line 1: {name}" in done.output
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_text_among_the_arrays_of_a_scene_is_left_out(copy: Path) -> None:
     (path,) = (copy / "scenes").iterdir()
     np.savez(path, **{name: values.astype(str) for name, values in records.read_arrays(path).items()})

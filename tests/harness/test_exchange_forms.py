@@ -122,15 +122,19 @@ def test_one_npz_holds_the_same(form: Form, scenes: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "out", "message"),
     [
-        (["--format", "op4", "--form", "dual"], "none with --form"),
-        (["--format", "npz", "--with-reference"], "needs --form"),
-        ([], "--format: format = None: one of"),
+        ("--format op4 --form dual", "p", "none with --form"),
+        ("--format npz --with-reference", "p", "needs --form"),
+        ("", "p", "--format: format = None: one of"),
+        ("--form dual --with-reference", "p.mps", "it holds no answer"),
+        ("--form dual --with-reference", "p.parquet", "it holds no answer"),
     ],
 )
-def test_options_that_exclude_others(words: list[str], message: str, scenes: Path, tmp_path: Path) -> None:
-    done = harness("export", scenes / "tiny.npz", *words, "--out", tmp_path / "p")
+def test_options_that_exclude_others(
+    words: str, out: str, message: str, scenes: Path, tmp_path: Path
+) -> None:
+    done = harness("export", scenes / "tiny.npz", *words.split(), "--out", tmp_path / out)
     assert done.exit_code == 2
     assert message in done.stderr
 
@@ -364,9 +368,13 @@ def test_a_suite_is_a_test_set(scenes: Path, tmp_path: Path) -> None:
         assert np.array_equal(line["G"].reshape(-1, n), dense(problem.G))
 
 
-@pytest.mark.parametrize("name", ["p.mps", "p.parquet"])
-def test_these_files_hold_no_answer(name: str, scenes: Path, tmp_path: Path) -> None:
-    words = ("--form", "dual", "--with-reference", "--out", tmp_path / name)
-    done = harness("export", scenes / "strip.toml", *words)
+def test_two_programs_of_one_name_are_no_test_set(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        write_strip(tmp_path / folder)
+    suite = tmp_path / "two.toml"
+    suite.write_text('scenes = ["a/strip.toml", "b/strip.toml"]\n[[solver]]\nname = "gi"\n')
+    done = harness("export", suite, "--form", "dual", "--out", tmp_path / "two.parquet")
     assert done.exit_code == 2
-    assert "it holds no answer" in done.stderr
+    assert "scenes = ['strip']: names of their own" in done.stderr

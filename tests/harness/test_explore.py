@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bokeh.document import Document
 from commands import harness
-from small_joints import FASTENERS, GAP, two_parts
+from small_joints import FASTENERS, GAP, scene_at, two_parts
 
 from harness import solve
 from harness.explore import page as explore_page
@@ -18,8 +18,6 @@ from harness.explore.live_answers import CHANGED, Explorer, Settings
 from harness.explore.raster import Raster
 from harness.scene.scene_file import edited
 from problems.errors import InputError
-from problems.model.scene import JointScene
-from problems.scene_files import read_scene
 
 PRESSURE = """
 [[effect]]
@@ -36,16 +34,10 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def scene_of(path: Path) -> JointScene:
-    read = read_scene(str(path))
-    assert isinstance(read, JointScene)
-    return read
-
-
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Path, form: Any) -> None:
     """After moves, each from the answer before."""
-    explorer, settings = Explorer(scene_of(path), form), Settings.of(scene_of(path))
+    explorer, settings = Explorer(scene_at(path), form), Settings.of(scene_at(path))
     answer = explorer.answer(settings)
     for k, change in enumerate(
         (
@@ -65,7 +57,7 @@ def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Pat
         assert answer.error_mm is not None
         assert abs(answer.gap - solution.gap).max() <= answer.error_mm + 1e-7
         assert answer.error_mm <= 1e-6
-        assert Settings.of(scene_of(saved)) == settings
+        assert Settings.of(scene_at(saved)) == settings
         np.testing.assert_allclose(answer.load.f, solution.problem.load.f, rtol=1e-12, atol=1e-12)
     assert answer.gap.max() > 0.05  # with no fastener left
 
@@ -95,7 +87,7 @@ def test_each_stage_is_that_of_solve(
     """
     scene = tmp_path / "scene.toml"
     scene.write_text(staged(path, preload))
-    explorer = Explorer(scene_of(scene), form)
+    explorer = Explorer(scene_at(scene), form)
     assert [len(set(map(id, explorer.sessions))), len(explorer.sessions)] == problems
     settings, answer = explorer.settings, None
     moved = (*settings.places[:2], (123.4, 40.0))
@@ -120,13 +112,26 @@ def test_each_stage_is_that_of_solve(
     assert abs(answer.stages[0].gap - answer.gap).max() > 0.01
 
 
+def test_an_answer_to_unproven_approaches_is_not_proven(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the second stage locks is known to a millimetre; its own gaps are proven."""
+    (tmp_path / "scene.toml").write_text(staged(path))
+    explorer = Explorer(scene_at(tmp_path / "scene.toml"))
+    first = explorer.sessions[0]
+    proven = first.proven
+    monkeypatch.setattr(first, "proven", lambda *of: (*proven(*of)[:3], 1.0))
+    stages = explorer.proven(explorer.answer(explorer.settings)).stages
+    assert np.isfinite([stage.error_mm for stage in stages]).tolist() == [True, True, False, False]
+
+
 def test_a_shifted_support_stays_in_a_scene_with_stages(path: Path, tmp_path: Path) -> None:
     """What stages set is looked at in each of them: a support that none has is still refused."""
     place = 'part = "a"\npoints = [[100.0, 70.0]]\n'
     supports = f'[[effect]]\nkind = "supports"\nname = "prop"\n{place}'
     shift = f'[[effect]]\nkind = "support_shift"\n{place}shift = 0.1\n'
     (tmp_path / "scene.toml").write_text(staged(path) + supports + shift)
-    scene = scene_of(tmp_path / "scene.toml")
+    scene = scene_at(tmp_path / "scene.toml")
     settings = Settings.of(scene)
     assert len(settings.applied(scene)) == len(scene.effects)
     alone = replace(scene, effects=tuple(e for e in scene.effects if e.kind != "supports"))
@@ -157,7 +162,7 @@ def test_stages_set_one_table_of_fasteners_that_move(
     text = staged(path).replace(old, new, 1)
     scene.write_text(text.replace("on = ['tacks']", "on = []") if "csv" in new else text)
     with pytest.raises(InputError, match=said):
-        Explorer(scene_of(scene), "dual")
+        Explorer(scene_at(scene), "dual")
 
 
 def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
@@ -166,8 +171,8 @@ def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
     gaps = gap.format(["a", "b"], 0.01) + gap.format(["b", "c"], 0.7)
     path = tmp_path / "three.toml"
     path.write_text(f"{two_parts()}[[joint.part]]{third}{gaps}{FASTENERS}")
-    explorer = Explorer(scene_of(path), "dual")
-    answer = explorer.proven(explorer.answer(Settings.of(scene_of(path))))
+    explorer = Explorer(scene_at(path), "dual")
+    answer = explorer.proven(explorer.answer(Settings.of(scene_at(path))))
     assert abs(answer.gap - solve(str(path)).gap).max() <= 1e-7
     assert answer.settings.means == (0.01, 0.7)
 
@@ -178,7 +183,7 @@ def test_what_is_in_the_file_of_the_assembly_cannot_be_saved_changed(tmp_path: P
     )
     path = tmp_path / "scene.toml"
     path.write_text(f'assembly = "joint.toml"\n{GAP}{FASTENERS}')
-    settings = Settings.of(scene_of(path))
+    settings = Settings.of(scene_at(path))
     assert settings.pressures == (1e-4,)
     with pytest.raises(InputError, match=r"joint\.toml: effect = \['pressure'\]: these in the scene itself"):
         edited(str(path), tmp_path, settings.write_to, CHANGED)
@@ -196,7 +201,7 @@ def test_what_is_in_the_file_of_the_assembly_cannot_be_saved_changed(tmp_path: P
     ],
 )
 def test_wrong_values_are_refused_as_by_validate(path: Path, change: dict[str, Any], said: list[str]) -> None:
-    scene = scene_of(path)
+    scene = scene_at(path)
     with pytest.raises(InputError) as caught:
         replace(Settings.of(scene), **change).applied(scene)
     for word in said:
@@ -213,7 +218,7 @@ points = [[150.0, 25.0]]
 def page_of(path: Path, text: str) -> Any:
     """A page of a scene as in a browser, without one."""
     path.write_text(text)
-    explorer, settings = Explorer(scene_of(path), "dual"), Settings.of(scene_of(path))
+    explorer, settings = Explorer(scene_at(path), "dual"), Settings.of(scene_at(path))
     document = Document()
     return explore_page.Page(explorer, str(path), 0.05, explorer.answer(settings), document)
 
@@ -265,7 +270,7 @@ def test_a_dropped_fastener_is_solved_and_saved_to_the_micrometre(path: Path, tm
     assert page.answer.settings.places == ((77.01, 12.346), (50.123456789, 25.0))
     page.path.value = str(tmp_path / "moved.toml")
     page.save()
-    assert Settings.of(scene_of(tmp_path / "moved.toml")) == page.answer.settings
+    assert Settings.of(scene_at(tmp_path / "moved.toml")) == page.answer.settings
 
 
 def test_a_file_that_has_changed_is_not_saved_with_the_answer_to_the_old_one(
@@ -284,24 +289,11 @@ def test_a_file_that_has_changed_is_not_saved_with_the_answer_to_the_old_one(
     assert moved.read_text().endswith("# noted\n")
 
 
-def test_a_saved_scene_finds_its_files(tmp_path: Path) -> None:
-    """From another folder; comments and the title stay."""
-    home, there = tmp_path / "home", tmp_path / "there"
-    home.mkdir()
-    there.mkdir()
-    (home / "gap.csv").write_text("x,y,gap\n0,0,0.1\n100,50,0.2\n0,50,0.1\n100,0,0.1\n")
-    measured = '[[effect]]\nkind = "measured_gap"\nfile = "gap.csv"  # of the scan\n'
-    (home / "scene.toml").write_text(two_parts() + measured + FASTENERS)
-    settings = Settings.of(scene_of(home / "scene.toml"))
-    text = edited(str(home / "scene.toml"), there, replace(settings, preload=77.0).write_to, CHANGED)
-    (there / "scene.toml").write_text(text)
-    assert "# of the scan" in text
-    assert "../home/gap.csv" in text
-    assert Settings.of(scene_of(there / "scene.toml")).preload == 77.0
-
-
 def test_a_scene_written_through_links_finds_its_files(tmp_path: Path) -> None:
-    """From a linked folder to another, as on clusters; a file that is a link itself keeps its name."""
+    """From a linked folder to another, as on clusters; a file that is a link itself keeps its name.
+
+    Comments stay.
+    """
     home, far = tmp_path / "a" / "home", tmp_path / "b" / "c" / "far"
     home.mkdir(parents=True)
     far.mkdir(parents=True)
@@ -310,13 +302,13 @@ def test_a_scene_written_through_links_finds_its_files(tmp_path: Path) -> None:
     (tmp_path / "store").write_text("x,y,gap\n0,0,0.1\n100,50,0.2\n0,50,0.1\n100,0,0.1\n")
     (home.parent / "gap.csv").symlink_to(tmp_path / "store")
     scene = home / "scene.toml"
-    scene.write_text(
-        two_parts() + '[[effect]]\nkind = "measured_gap"\nfile = "../gap.csv"\n' + FASTENERS, "utf-8"
-    )
+    measured = '[[effect]]\nkind = "measured_gap"\nfile = "../gap.csv"  # of the scan\n'
+    scene.write_text(two_parts() + measured + FASTENERS, "utf-8")
     text = edited(str(tmp_path / "joint/scene.toml"), tmp_path / "results", lambda _: None, CHANGED)
     (far / "scene.toml").write_text(text, "utf-8")
     assert '"../../../a/gap.csv"' in text
-    assert scene_of(tmp_path / "results/scene.toml").key == scene_of(scene).key
+    assert "# of the scan" in text
+    assert scene_at(tmp_path / "results/scene.toml").key == scene_at(scene).key
 
 
 @pytest.mark.parametrize(
@@ -344,15 +336,15 @@ def test_a_browser_in_the_terminal_gets_the_page(path: Path, monkeypatch: pytest
 
 
 def test_the_outcome_in_words(path: Path) -> None:
-    page = pytest.importorskip("harness.explore.page")
-    explorer, settings = Explorer(scene_of(path), "dual"), Settings.of(scene_of(path))
+    explorer, settings = Explorer(scene_at(path), "dual"), Settings.of(scene_at(path))
     answer = explorer.answer(settings)
     places, largest = explorer.data.assembly.contact_nodes, float(answer.gap.max())
-    assert ">FAIL<" in page.outcome(answer, places, largest / 2)
-    assert ">PASS<" in page.outcome(answer, places, largest * 2)
+    assert ">FAIL<" in explore_page.outcome(answer, places, largest / 2)
+    assert ">PASS<" in explore_page.outcome(answer, places, largest * 2)
     proven = explorer.proven(answer)
-    assert "proven" in page.outcome(proven, places, largest * 2)
-    assert ">cannot be told<" in page.outcome(replace(proven, error_mm=largest), places, largest * 1.1)
+    assert "proven" in explore_page.outcome(proven, places, largest * 2)
+    unsure = replace(proven, error_mm=largest)
+    assert ">cannot be told<" in explore_page.outcome(unsure, places, largest * 1.1)
 
 
 def test_the_raster_shows_every_contact_where_it_is() -> None:

@@ -178,6 +178,8 @@ def timed(first: Row, times: list[float], others: list[float]) -> list[Row]:
     ]
 
 
+#: A gated row, which `timed` repeats.
+FIRST = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
 BEFORE = [1.0, 1.1, 1.2], [2.0, 2.1, 2.2]
 
 
@@ -196,36 +198,33 @@ BEFORE = [1.0, 1.1, 1.2], [2.0, 2.1, 2.2]
 def test_times_are_compared_beside_other_solvers(
     times: list[float], others: list[float], slowdown: float | None
 ) -> None:
-    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
-    old, new = Side("old", timed(first, *BEFORE)), Side("new", timed(first, times, others))
+    old, new = Side("old", timed(FIRST, *BEFORE)), Side("new", timed(FIRST, times, others))
     found = slowdowns(old, new, 1.5)
-    assert found.slower == ({} if slowdown is None else {measurement(first): pytest.approx(slowdown)})
-    assert measurement(first) in found.compared
+    slower = {name: ratio for name, ratio in found.items() if ratio is not None}
+    assert slower == ({} if slowdown is None else {measurement(FIRST): pytest.approx(slowdown)})
+    assert measurement(FIRST) in found
 
 
 def test_no_pair_of_a_scenes_measurements_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """The load cases of a series are measurements of one scene: their square filled the memory."""
     monkeypatch.setattr(pd.DataFrame, "merge", None)
-    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
-    cases = [timed(first | {"case": k}, [1.0 + k, 1.1 + k, 1.2 + k], [2.0, 2.1, 2.2]) for k in range(3)]
+    cases = [timed(FIRST | {"case": k}, [1.0 + k, 1.1 + k, 1.2 + k], [2.0, 2.1, 2.2]) for k in range(3)]
     old = [row for case in cases for row in case]
     slower = [row | {"solve_s": row["solve_s"] * (3 if row["solver"] == "exact" else 1)} for row in old]
     found = slowdowns(Side("old", old), Side("new", slower), 1.5)
-    assert {round(ratio, 9) for ratio in found.slower.values()} == {3.0}
-    assert (len(found.slower), len(found.compared)) == (3, 6)
+    ratios = [round(ratio, 9) for ratio in found.values() if ratio is not None]
+    assert (ratios, len(found)) == ([3.0] * 3, 6)
 
 
 def test_single_runs_tell_nothing_of_times() -> None:
-    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
     with pytest.raises(InputError, match="3 repeats of two solvers"):
-        slowdowns(Side("old", timed(first, [1.0], [2.0])), Side("new", timed(first, [9.0], [2.0])), 1.5)
+        slowdowns(Side("old", timed(FIRST, [1.0], [2.0])), Side("new", timed(FIRST, [9.0], [2.0])), 1.5)
 
 
 @pytest.mark.parametrize("mixed", ["old", "new"])
 def test_no_median_is_of_two_machines(mixed: str) -> None:
     """One of the three repeats is of another, on one of the sides."""
-    first = row("4386/0052", "exact", key="4386/0052 exact repeat=0")
-    sides = {name: Side(name, timed(first, *BEFORE)) for name in ("old", "new")}
+    sides = {name: Side(name, timed(FIRST, *BEFORE)) for name in ("old", "new")}
     sides[mixed].rows[-1]["machine"] = "another"
     with pytest.raises(Incomparable, match=rf"{mixed}: machine = .*another.*one machine") as raised:
         slowdowns(**sides, limit=1.5)
@@ -267,6 +266,23 @@ def test_times_without_repeats_or_another_solver_tell_nothing(copy: Path, finish
         done = gate(copy, *words, "--max-slowdown", 1.5)
         assert done.exit_code == 2
         assert ("in both runs: --repeat 3" if words else "needs --baseline DIR") in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--margin", "--max-slowdown"])
+def test_a_factor_that_is_no_number_passes_nothing(option: str, finished: Path) -> None:
+    """Nothing is larger than NaN: every measurement passed."""
+    done = gate(finished, "--baseline", finished, option, "nan")
+    assert done.exit_code == 2
+    assert f"{option}: factor = nan: 1 or larger" in done.stderr
+
+
+def test_the_outcome_is_said_also_if_the_page_cannot_be_written(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path))  # a folder
+    done = gate(finished)
+    assert done.exit_code == 2
+    assert "Passed: all 2 gated rows" in done.stdout
 
 
 def test_the_page_of_a_job_has_the_outcome(

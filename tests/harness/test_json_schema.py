@@ -106,3 +106,10 @@ def test_the_command_writes_and_prints_it(tmp_path: Path) -> None:
     assert harness("schema", "suite", "--out", tmp_path / "suite.json").exit_code == 0
     printed = json.loads(harness("schema", "suite").stdout)
     assert printed == json.loads((tmp_path / "suite.json").read_text("utf-8")) == SUITE.schema
+
+
+def test_a_folder_is_no_file_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = harness("schema", "suite", "--out", ".")
+    assert done.exit_code == 2
+    assert "--out: path = '.': a file is to be written" in done.stderr

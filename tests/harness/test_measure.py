@@ -12,9 +12,12 @@ import tiny_joint
 from suite_runs import all_end
 
 from harness.measurement import child_process
+from harness.measurement.solver_descriptions import Description
+from harness.measurement.task import Task, run_task, run_task_on_worker
 from harness.measurement.worker import FinishedReport, measure
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
+from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 starts = pytest.mark.starts
@@ -191,6 +194,19 @@ def test_an_orphan_that_is_in_no_list_yet_is_killed_too(monkeypatch: pytest.Monk
     monkeypatch.setattr(os, "kill", lambda pid, sent: killed.append(pid))
     child_process.end_children(1)
     assert killed == [11, 12]
+
+
+def test_another_scene_than_that_of_the_reference_is_refused(folder: Path) -> None:
+    """It has changed meanwhile, or is older on a worker: right answers would be judged as wrong ones."""
+    entry = SolverEntry(name="gi")
+    suite = Suite(name="s", scenes=["tiny"], solver=[entry])
+    asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
+    m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
+    task = Task([m], Description(["dual"], "1", "code"), "of another file")
+    with pytest.raises(InputError, match="it has changed since, or is another on this worker"):
+        run_task(task, folder)
+    with pytest.raises(InputError, match="the file that the run has read"):
+        run_task_on_worker(task)
 
 
 def test_a_full_disk_is_not_the_solvers_fault(folder: Path) -> None:

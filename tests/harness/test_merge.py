@@ -14,6 +14,8 @@ from harness.results import records
 from report.analysis.time_to_solution import stage_seconds
 from report.results.reader import read
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 FAST, SLOW = "A fast CPU, 64 cores", "A slow CPU, 1 core"
 LOW, HIGH = "4386/0052", "4386/1074"
 SHARED = {"key": f"{LOW} shared", "solver": "gi"}

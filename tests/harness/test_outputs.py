@@ -57,7 +57,12 @@ def test_an_answer_replaces_no_file_that_its_scene_names(tmp_path: Path) -> None
         ("series strip.toml --cases 1", "report/scan.csv"),
         ("series strip.toml --cases 1", "allowed-gap.csv"),
         ("place strip.toml --count 1 --cases 2 --share 1", "report/scan.csv"),
+        ("place strip.toml --count 1 --cases 2 --share 1", "plan/scan.csv"),
         ("tolerance strip.toml --key initial_gap.mean --range 0.1:0.2 --allow-gap 1", "shares.csv"),
+        ("solve strip.toml", "nodes.csv"),
+        ("solve strip.toml strip.toml", "contacts.csv"),
+        ("compare a b", "index.html"),
+        ("export strip.toml --form dual", "P.mtx"),
         ("run gate --solver gi --scene gallery/three-part-stack", "report/scan.csv"),
         ("run gate --solver gi --scene gallery/three-part-stack", "suite.toml"),
     ],
@@ -109,3 +114,10 @@ def test_refused_before_work(command: str, out: str, tmp_path: Path, monkeypatch
     assert out in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "locked"]
+
+
+@pytest.mark.parametrize("option", ["--json", "--junit"])
+def test_a_folder_is_no_file_of_findings(option: str, tmp_path: Path) -> None:
+    done = harness("gate", tmp_path, option, tmp_path)
+    assert done.exit_code == 2
+    assert "cannot be written: it is a folder" in done.stderr

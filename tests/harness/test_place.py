@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import tomllib
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import replace
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from clopper_pearson import interval_of
 from commands import harness
 from scipy.stats import binom, binomtest
 from small_joints import FASTENERS, GAP, INLINE, two_parts
@@ -25,7 +25,7 @@ from harness import place as place_fasteners
 from harness.placement import search as search_module
 from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, uniform_plans
-from harness.placement.fresh_cases import Cases, Goal, search_in_rounds
+from harness.placement.fresh_cases import Cases, Goal, Sample, search_in_rounds
 from harness.placement.search import Search
 from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question, answer
 from harness.planning.form_choice import Choice
@@ -148,7 +148,7 @@ def test_fewest_are_near_optimum(strip: Path, session: PlanSession) -> None:
         optimum = next(
             count
             for count in range(len(candidates) + 1)
-            if any(search.whole(plan).gap_mm <= limit for plan in combinations(candidates, count))
+            if any(step.gap_mm <= limit for step in search.wholes([*combinations(candidates, count)]))
         )
         best, _ = search.fewest(search.whole(candidates))
         assert search.whole(best.plan).gap_mm == best.gap_mm <= limit
@@ -253,6 +253,15 @@ def test_a_plan_that_fresh_cases_refute_is_searched_again(strip: Path) -> None:
     assert len(told_by.sentences) == 1
 
 
+def test_a_case_of_which_nothing_is_proven_neither_keeps_the_limit_nor_fails(strip: Path) -> None:
+    """Of twenty cases one leaves more, and one is not proven: it counts at one end of the interval only."""
+    gaps = {0: float("inf"), 1: 1.0}
+    search = told(strip, plans_of(strip, 1, 4), lambda _, case: gaps.get(case, 0.1))
+    sample = Sample.of((), search, Goal(0.5, 0.5), Cases(range(20), 20), slice(0, 20), 0.05)
+    assert sample.kept == 18
+    assert sample.interval == pytest.approx((interval_of(18, 20)[0], interval_of(19, 20)[1]))
+
+
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])
 def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> None:
     """By binomial sums: more failures show the share no longer, and half as many pass four times in five."""
@@ -269,7 +278,7 @@ def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: Path) -> None:
     """The scan in place of the scene's gap, or the law that options gave; `solve` takes them from there."""
     scan, holes = tmp_path / "scan.csv", tmp_path / "holes.csv"
@@ -284,7 +293,8 @@ def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: P
     scene = read_scene(str(tmp_path / "a" / "plan.toml"))
     assert [effect.kind for effect in scene.effects] == ["fasteners", "measured_gap"]
     assert load_case(scene, effects=scene.effects).g[0] == pytest.approx(0.03)
-    assert place(strip, tmp_path / "b", "--count", 2, "--mean", 0.2).exit_code == 0
+    few = "--candidates", "1x3", "--count", 2
+    assert place(strip, tmp_path / "b", *few, "--mean", 0.2).exit_code == 0
     scene = read_scene(str(tmp_path / "b" / "own.toml"))
     (gap,) = (effect for effect in scene.effects if effect.kind == "initial_gap")
     assert (gap.mean, gap.random.sd, gap.random.correlation_length) == (0.2, 0.02, 60.0)
@@ -297,12 +307,12 @@ def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: P
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     gaps = random_gaps(MovableFasteners.of(read_scene(str(strip))).bare, 40, 7)
     for rows in (40, 1):
         np.savetxt(tmp_path / f"{rows}.csv", [gaps.load(k).g for k in range(rows)], delimiter=",")
-    goal = ("--candidates", "2x6", "--allow-gap", 0.08, "--out")
+    goal = ("--candidates", "2x4", "--allow-gap", 0.08, "--out")
     many = harness("place", strip, "--gaps", tmp_path / "40.csv", "--share", 0.8, *goal, tmp_path / "many")
     assert "Every second row is held back" in many.output
     assert re.search(r"keeps? 0\.08 mm in (all|[\d.]+ % of) 20 held-back rows \(95 % interval", many.output)
@@ -316,7 +326,7 @@ def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     assert "half of 40 rows are held back: take 144 rows, or a share of 1" in few.output
 
 
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_plan_for_joints_that_vary_as_scans_do(strip: Path, tmp_path: Path) -> None:
     """Fresh joints of the same modes decide, and are the series of the plan."""
     random = np.random.default_rng(2)
@@ -396,23 +406,27 @@ def place(path: Path, out: Path, *words: object) -> Any:
     return harness("place", path, "--candidates", "2x6", "--cases", 6, "--share", 1, "--out", out, *words)
 
 
+#: Words of a search that asks little: it compares all plans of two of four places.
+FEW = ("--candidates", "1x4", "--count", 2)
+
+
 @pytest.fixture(scope="module")
-def whole(strip: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The directory of a finished search, which tests copy, and what its command says."""
-    out = tmp_path_factory.mktemp("whole") / "out"
+def compared(strip: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of that search, without its report."""
+    out = tmp_path_factory.mktemp("compared")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("report.writers.series_report.write", lambda directory: directory)
-        done = place(strip, out, "--allow-gap", 0.05)
-    assert done.exit_code == 0, done.output
-    return out, done.output
+        patch.setattr("report.writers.place_report.write", Path)
+        assert place(strip, out, *FEW).exit_code == 0
+    return out
 
 
 @pytest.mark.slow
 def test_the_command_finds_a_plan_that_solve_confirms(
-    strip: Path, tmp_path: Path, whole: tuple[Path, str], request: pytest.FixtureRequest
+    strip: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    shutil.copytree(whole[0], tmp_path / "out")
-    said, record = whole[1], records_of(tmp_path / "out")
+    done = place(strip, tmp_path / "out", "--allow-gap", 0.05)
+    assert done.exit_code == 0, done.output
+    said, record = done.output, records_of(tmp_path / "out")
     best, plan = record["best"], tmp_path / "out" / "plan.toml"
     assert best["fasteners"] < len(record["candidates"])
     assert best["gap_mm"] <= 0.05
@@ -460,34 +474,35 @@ def test_the_command_finds_a_plan_that_solve_confirms(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_no_fastener_at_all_is_a_plan(strip: Path, tmp_path: Path) -> None:
     """Where the limit is larger than the gap without fasteners."""
-    assert place(strip, tmp_path, "--allow-gap", 9.0).exit_code == 0
+    assert place(strip, tmp_path, "--candidates", "1x3", "--allow-gap", 9.0).exit_code == 0
     assert records_of(tmp_path)["best"]["plan"] == []
     effects = read_scene(str(tmp_path / "plan.toml")).effects
     assert not any(effect.kind == "fasteners" for effect in effects)
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_report")
 def test_an_interrupted_search_goes_on(
-    strip: Path, tmp_path: Path, whole: tuple[Path, str], monkeypatch: pytest.MonkeyPatch
+    strip: Path, tmp_path: Path, compared: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """While the plan of the best estimates is proven."""
     keep, kept = AnswerJournal._keep, [0]
 
     def interrupted(self: AnswerJournal, *answer: Any) -> None:
         keep(self, *answer)
         kept[0] += 1
-        if kept[0] == 17:
+        if kept[0] == 7:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(AnswerJournal, "_keep", interrupted)
-        assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 130
-    assert len((tmp_path / "parts" / PLANS).read_text().splitlines()) == 1 + 17
-    assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 0
-    assert records_of(whole[0]) == records_of(tmp_path / "parts")
+        assert place(strip, tmp_path / "parts", *FEW).exit_code == 130
+    assert len((tmp_path / "parts" / PLANS).read_text().splitlines()) == 1 + 7
+    assert place(strip, tmp_path / "parts", *FEW).exit_code == 0
+    assert records_of(compared) == records_of(tmp_path / "parts")
 
 
 def test_workers_get_the_rows_of_their_question(
@@ -546,12 +561,11 @@ def test_figures_without_a_bound_are_read_again(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
-def test_workers_find_the_same(strip: Path, tmp_path: Path, whole: tuple[Path, str], cluster: Any) -> None:
-    address = cluster.scheduler_address
-    two = place(strip, tmp_path / "two", "--allow-gap", 0.05, "--scheduler", address)
+@pytest.mark.usefixtures("without_report")
+def test_workers_find_the_same(strip: Path, tmp_path: Path, compared: Path, cluster: Any) -> None:
+    two = place(strip, tmp_path / "two", *FEW, "--scheduler", cluster.scheduler_address)
     assert two.exit_code == 0, two.output
-    assert records_of(whole[0]) == records_of(tmp_path / "two")
+    assert records_of(compared) == records_of(tmp_path / "two")
 
 
 def records_of(directory: Path) -> dict[str, Any]:
@@ -562,7 +576,7 @@ def records_of(directory: Path) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("without_report", "without_pictures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_limit_that_no_plan_keeps_says_where_and_by_how_much(strip: Path, tmp_path: Path) -> None:
     done = place(strip, tmp_path / "out", "--allow-gap", 0.001)
     assert done.exit_code == 4
@@ -631,15 +645,6 @@ def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
     (tmp_path / "holes.csv").write_text("x,y\n10,10\n30,10\n")
     with pytest.raises(InputError, match=r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"):
         MovableFasteners.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
-
-
-def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) -> None:
-    """A series in DIR/plan, which the end of the search would meet."""
-    (tmp_path / "plan").mkdir()
-    done = place(strip, tmp_path, "--count", 2)
-    assert done.exit_code == 2
-    assert "has plan of another command: name another directory" in done.output
-    assert not (tmp_path / PLANS).exists()
 
 
 class ReachedError(Exception):
@@ -716,7 +721,7 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["place", "shim"])
-@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.usefixtures("without_report")
 def test_a_file_that_changes_during_the_search_changes_no_plan(
     command: str, strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,7 +15,7 @@ from suite_runs import rows_of, said_by
 from harness.measurement.suite_run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
-from harness.results.provenance import HOOK_VARIABLES, ROOT, provenance
+from harness.results.provenance import HOOK_VARIABLES, ROOT, fingerprints, provenance
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from problems import __version__
@@ -122,6 +122,16 @@ def test_the_repository_of_another_project_is_not_ours(tmp_path: Path, tracked: 
         (tmp_path / "other/.gitignore").write_text(".venv/\n")
     committed(tmp_path / "other")
     assert code_of(site) == NOT_KNOWN
+
+
+def test_two_files_of_one_name_have_a_hash_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the path of the second is the name of the first."""
+    monkeypatch.chdir(tmp_path)
+    files = [Path("parts/gaps.csv"), Path("gaps.csv")]
+    files[0].parent.mkdir()
+    for k, file in enumerate(files):
+        file.write_text(str(k))
+    assert len({*fingerprints(files).values()}) == 2
 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A run from a suite to rows, answers, report and gate, through real workers on a tiny scene; and a row of it
+"""A run from a suite to rows, answers and gate, through real workers on a tiny scene; and a row of it
 measured again, `run DIR --key KEY`.
 """
 
@@ -23,11 +23,11 @@ from harness.measurement.suite_run import run
 from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite, read_written
 from harness.results import records
-from harness.results.answer_files import pack
 from harness.results.records import Row
 from problems.errors import InputError
+from studies.smaller_results import pack
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
 CONTRACT = {
     "suite", "scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeat",
@@ -272,6 +272,22 @@ def test_gate_with_nothing_to_judge(copy: Path, rows_kept: str) -> None:
     code, text = gated(copy)
     assert code == 3
     assert "Nothing could be judged" in text
+
+
+@pytest.mark.usefixtures("finished")
+def test_an_answer_that_cannot_be_saved_ends_the_run(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is no failure of its solver, and is measured again by the next run."""
+
+    def measure(batch: list[Any], files: list[Path]) -> list[dict[str, Any]]:
+        return [{"status": "failed", "answer": None, "cannot_save": f"{files[0]}: no space left"}]
+
+    monkeypatch.setattr("harness.measurement.task.measure", measure)
+    done = harness("run", folder / "small.toml", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "no space left; rows already written are safe" in done.stderr
+    assert not (tmp_path / "out" / records.MEASUREMENTS).exists()
 
 
 def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path) -> None:

@@ -67,7 +67,7 @@ FAULTY = (
     + """
 [[solver]]
 name = "faulty"
-time_limit_s = 2
+time_limit_s = 1
 options = { fault = "FAULT", only = 3 }
 """
 )
@@ -137,7 +137,7 @@ def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:
     ("fault", "status", "why"),
     [
         ("leave", "crashed", "exit code 7"),
-        ("sleep", "time_limit", "more than 2 s"),
+        ("sleep", "time_limit", "more than 1 s"),
         ("system_exit", "failed", "enough"),
     ],
 )

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from clopper_pearson import interval_of
 from commands import harness
-from scipy.stats import beta
-from small_joints import FASTENERS, GAP, INLINE, JOINT, PART, make_joint, two_parts, with_gap
+from shim_studies import search_of, study_of
+from small_joints import FASTENERS, GAP, INLINE, JOINT, PART, make_joint, scene_at, two_parts, with_gap
 from superelements import flat, scene_from, write_part
 
 from harness import solve
@@ -35,7 +36,6 @@ from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.fastener_forces import fastener_forces
-from problems.model.scene import JointScene
 from problems.reporter import SILENT
 from problems.scene_files import read_scene
 
@@ -51,10 +51,10 @@ def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def session_of(path: Path, patches: str, limits: tuple[float, float] = (inf, inf)) -> PlanSession:
-    scene = read_scene(str(path))
-    cases = Listed((load_case(scene),))
-    return PlanSession(ShimStudy(scene, cases, "dual", patches_of(scene.joint, patches), limits, scene))
+@pytest.fixture(scope="module")
+def study(strip: Path) -> ShimStudy:
+    """Of four patches."""
+    return study_of(strip, "4x1")
 
 
 def shim(path: Path, out: Path, *words: object) -> Any:
@@ -68,27 +68,27 @@ def record_of(directory: Path) -> dict[str, Any]:
 
 def test_a_plan_leaves_what_a_scene_with_its_shims_leaves(strip: Path) -> None:
     """Gaps and the largest force, against `solve` on the scene with the effects."""
-    session = session_of(strip, "4x2", (1e6, inf))
+    study = study_of(strip, "4x2", (1e6, inf))
+    session = PlanSession(study)
     plan = ((0, 0.02), (5, 0.04))
     (outcome,) = session.answer(Question((plan,), (0,)))
     _, estimated = session.answer(Question(((), plan), (0,), base=()))
-    scene = session.study.bare
-    answer = solve(replace(scene, effects=(*scene.effects, *map(session.study.effect, plan))))
+    scene = study.bare
+    answer = solve(replace(scene, effects=(*scene.effects, *map(study.effect, plan))))
     assert answer.gap.max() <= outcome.largest[0] <= answer.gap.max() + 1e-7
     force = max(abs(one["force_N"]) for one in fastener_forces(scene, answer.x))
     assert outcome.further[0][-2] == pytest.approx(force, rel=1e-9)
     np.testing.assert_allclose(estimated.further, outcome.further, rtol=1e-3)
-    (areas,) = (study.areas for study in [session.study] if isinstance(study, ShimStudy))
-    assert sum(outcome.further[0][9:18]) == pytest.approx(np.maximum(answer.gap, 0) @ areas, rel=1e-6)
-    assert areas.sum() == pytest.approx(200.0 * 50.0)
+    assert sum(outcome.further[0][9:18]) == pytest.approx(np.maximum(answer.gap, 0) @ study.areas, rel=1e-6)
+    assert study.areas.sum() == pytest.approx(200.0 * 50.0)
 
 
 def test_a_shim_over_all_contacts_is_a_smaller_gap(strip: Path) -> None:
     """To the last bit, at thicknesses that binary numbers hold."""
-    scene = read_scene(str(strip))
-    gap = next(effect for effect in scene.effects if effect.kind == "initial_gap")  # type: ignore[attr-defined]
+    scene = scene_at(strip)
+    gap = next(effect for effect in scene.effects if effect.kind == "initial_gap")
     flat = [gap.model_copy(update={"mean": mean, "random": None}) for mean in (0.5, 0.25)]
-    rest = [effect for effect in scene.effects if effect is not gap]  # type: ignore[attr-defined]
+    rest = [effect for effect in scene.effects if effect is not gap]
     sheet = Shims(kind="shims", thickness=0.25, x=(0.0, 200.0), y=(0.0, 50.0))
     shimmed, smaller = (replace(scene, effects=(*rest, *some)) for some in ([flat[0], sheet], [flat[1]]))
     assert load_case(shimmed).g.tobytes() == load_case(smaller).g.tobytes()
@@ -98,13 +98,12 @@ def test_a_shim_over_all_contacts_is_a_smaller_gap(strip: Path) -> None:
 @pytest.mark.parametrize(("patches", "share"), [("4x1", 0.7), ("2x2", 0.35)])
 def test_the_least_of_all_plans_is_found(strip: Path, patches: str, share: float) -> None:
     """Against all 4⁴ plans of four patches and three thicknesses; the limit is a share of the gap without."""
-    session = session_of(strip, patches)
+    session = PlanSession(study_of(strip, patches))
     plans = [tuple((k, t) for k, t in enumerate(plan) if t) for plan in product((0.0, *STOCK), repeat=4)]
-    gaps = {plan: session.answers([plan], (0,), 1e-9)[-1].vectors[1].max() for plan in plans}
-    study = session.study
-    assert isinstance(study, ShimStudy)
+    largest = session.answers(plans, (0,), 1e-9)[-1].vectors[1].max(axis=0)
+    gaps = dict(zip(plans, largest.tolist(), strict=True))
     limit = share * gaps[()]
-    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, limit, study, STOCK)
+    search = search_of(session, limit, STOCK)
     kept = [plan for plan, gap in gaps.items() if gap <= limit]
     _, best = search.once(())
     assert 0 < len(kept) < len(plans)
@@ -113,10 +112,7 @@ def test_the_least_of_all_plans_is_found(strip: Path, patches: str, share: float
 
 
 def test_a_force_counts_as_a_gap_with_the_same_share_of_its_limit(strip: Path) -> None:
-    session = session_of(strip, "4x1", (100.0, inf))
-    study = session.study
-    assert isinstance(study, ShimStudy)
-    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, 1.0, study, STOCK)
+    search = search_of(PlanSession(study_of(strip, "4x1", (100.0, inf))), 1.0, STOCK)
     (outcome,) = search.outcomes([()], [0], 50)
     assert outcome.largest[0] == max(*outcome.further[0][:5], outcome.further[0][-2] / 100.0)
     assert outcome.further[0][-2] >= 40.0  # a fastener's preload
@@ -127,7 +123,7 @@ def test_each_contact_is_in_one_patch(tmp_path: Path) -> None:
     """Nodes on borders of cells, and of rectangles of a CSV that touch."""
     path = tmp_path / "joint.toml"
     path.write_text(two_parts(length=200.0, nodes=(21, 5)) + FASTENERS)
-    joint = read_scene(str(path)).joint  # type: ignore[attr-defined]
+    joint = scene_at(path).joint
     csv = tmp_path / "patches.csv"
     csv.write_text("name,x_min,x_max,y_min,y_max\nleft,0,100,0,50\nright,100,200,0,25\n")
     for source, areas, missed in (("4x2", [1250.0] * 8, 0), (str(csv), [5000.0, 2500.0], 20)):
@@ -158,7 +154,7 @@ def test_a_cell_without_a_contact_is_no_patch(tmp_path: Path) -> None:
 
 def test_outlines_are_cut_to_any_shape(strip: Path, tmp_path: Path) -> None:
     """An L and the rest of a rectangle, whichever way round: the gap of two rectangles, each contact once."""
-    joint, csv = read_scene(str(strip)).joint, tmp_path / "outlines.csv"  # type: ignore[attr-defined]
+    joint, csv = scene_at(strip).joint, tmp_path / "outlines.csv"
     inner = [("L", 0, 0), ("L", 120, 0), ("L", 120, 25), ("L", 60, 25), ("L", 60, 50), ("L", 0, 50)]
     rest = [("rest", 60, 50), ("rest", 60, 25), ("rest", 120, 25), ("rest", 120, 50)]
     csv.write_text("name,x,y\n" + "".join(f"{name},{x},{y}\n" for name, x, y in inner + rest))
@@ -218,22 +214,25 @@ def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path,
     assert not (tmp_path / "out" / "shims.jsonl").exists()
 
 
+@pytest.mark.usefixtures("without_report")
 def test_a_scene_whose_effects_are_inline_tables_is_shimmed(tmp_path: Path) -> None:
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(INLINE + two_parts())
     asked = ("--allow-gap", 0.05, "--stock", "0.1,0.2", "--patches", "2x1")
     done = harness("shim", scene, *asked, "--out", out)
     assert done.exit_code in (0, 4), done.output
-    kinds = [effect.kind for effect in read_scene(str(out / "shimmed.toml")).effects]  # type: ignore[attr-defined]
+    kinds = [effect.kind for effect in scene_at(out / "shimmed.toml").effects]
     shims = sum(patch["thickness_mm"] > 0 for patch in record_of(out)["patches"])
     assert kinds == ["initial_gap", "fasteners", *["shims"] * shims]
     assert shims
 
 
-def test_the_gap_that_patches_follow_is_found_in_blocks(strip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_gap_that_patches_follow_is_found_in_blocks(
+    study: ShimStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of no more cases than memory has room for; the largest of all, as if they were solved at once."""
-    session, sizes = session_of(strip, "4x1"), list[int]()
-    session.cases = random_gaps(session.study.bare, 5, 0)
+    session, sizes = PlanSession(study), list[int]()
+    session.cases = random_gaps(study.bare, 5, 0)
     at_once = session.answers([()], range(5), 1e-9)[-1].vectors[1].max(axis=1)
     together = session.last.sweeps.together
     monkeypatch.setattr(
@@ -246,7 +245,7 @@ def test_the_gap_that_patches_follow_is_found_in_blocks(strip: Path, monkeypatch
 
 def test_a_region_is_divided_where_its_parts_differ_least(strip: Path) -> None:
     """By hand: the zone without a gap first; of two cuts with the same largest difference, the least sum."""
-    joint = read_scene(str(strip)).joint  # type: ignore[attr-defined]
+    joint = scene_at(strip).joint
     x, _ = joint.places(joint.pairs[0]).T
     zones = [x < 15, x < 25, x < 45, x < 65, x < 155]
     gap = np.select(zones, [0.25, 0.3125, 0.375, 0.5, 0.0], 0.3)
@@ -257,7 +256,7 @@ def test_a_region_is_divided_where_its_parts_differ_least(strip: Path) -> None:
 
 
 def test_each_joint_has_shims_of_its_own(
-    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    strip: Path, study: ShimStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What `solve` says of each of them with its shims; the same after an interruption; the stock adds up."""
     words, keep, kept = ("--each", "--cases", 3, "--share", 1, "--mean", 0.08), AnswerJournal._keep, [0]
@@ -278,9 +277,7 @@ def test_each_joint_has_shims_of_its_own(
     assert "of 3 joints can be kept within the limits" in done.output
     record = record_of(tmp_path / "whole")
     assert record["joints"] == record_of(tmp_path / "parts")["joints"]
-    scene = read_scene(str(strip))
-    assert isinstance(scene, JointScene)
-    study = session_of(strip, "4x1").study
+    scene = scene_at(strip)
     cases, pieces = GapCases(count=3, mean=0.08).of(scene, "dual"), 0
     for joint, line in zip(
         record["joints"], pd.read_csv(tmp_path / "whole" / "joints.csv").iloc, strict=True
@@ -313,7 +310,7 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
     for cases in (Listed((bare,) * count), gaps):
         study: Any = SimpleNamespace(cases=cases)
         *_, words, passed = each_joint(journal, study, Goal(limit, share), STOCK, SILENT)  # type: ignore[arg-type]
-        low = np.nan_to_num(proportion(count - failing, count)[0])
+        low, _ = interval_of(count - failing, count)
         needed = 1 - failing / count if cases is gaps or share == 1 else low
         assert passed == (needed >= share)
         assert f"interval {100 * low:.1f} to " in words
@@ -321,27 +318,11 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
         assert ("needs a shim" in words) == (0 < failing < count)
 
 
-def proportion(kept: int, count: int) -> tuple[float, float]:
-    """The interval of Clopper and Pearson by quantiles of beta distributions."""
-    low = float(beta.ppf(0.025, kept, count - kept + 1))
-    return low, 1.0 if kept == count else float(beta.ppf(0.975, kept + 1, count - kept))
-
-
 def test_stocks_are_lists_or_steps() -> None:
     assert stock_of("0.2,0.3,0.5") == (0.2, 0.3, 0.5)
     assert stock_of("0.05:0.2:0.05") == (0.05, 0.1, 0.15, 0.2)
-    for text in (
-        "",
-        "0",
-        "-0.1,0.2",
-        "0.3,0.2",
-        "0.2,0.2",
-        "nan",
-        "0.1:0.5",
-        "0.1:0.5:0",
-        "0.5:0.1:0.1",
-        "x",
-    ):
+    wrong = ["0", "-0.1,0.2", "0.3,0.2", "0.2,0.2", "nan", "0.1:0.5", "0.1:0.5:0", "0.5:0.1:0.1", "x"]
+    for text in ("", *wrong):
         with pytest.raises(InputError, match="ascending"):
             stock_of(text)
 
@@ -356,8 +337,8 @@ def test_the_command_finds_shims_that_solve_confirms(
     assert "in all 2 fresh cases (95 % interval" in done.output
     assert record["after"]["gap"] <= 0.08 < record["before"]["gap"]
     assert (table["gap_after_mm"] <= 0.08).all()
-    effects = read_scene(str(tmp_path / "out" / "shimmed.toml")).effects  # type: ignore[attr-defined]
-    cut = [(effect.outline[1][0], effect.thickness) for effect in effects if effect.kind == "shims"]
+    effects = scene_at(tmp_path / "out" / "shimmed.toml").effects_of(Shims)
+    cut = [(effect.outline[1][0], effect.thickness) for effect in effects]
     assert cut == [
         tuple(line) for line in table.query("thickness_mm > 0")[["x_max", "thickness_mm"]].to_numpy()
     ]
@@ -379,6 +360,7 @@ def test_the_command_finds_shims_that_solve_confirms(
     assert "allow_force" in other.output
 
 
+@pytest.mark.usefixtures("without_report")
 def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
     """Whose gap is as given."""
     path = tmp_path / "flat.toml"
@@ -440,6 +422,7 @@ def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("without_report")
 @pytest.mark.parametrize(("command", "row"), [("shim", 2), ("place", 0)])
 def test_no_answer_of_a_table_that_has_changed_is_used(
     strip: Path, tmp_path: Path, command: str, row: int
@@ -482,15 +465,10 @@ def test_two_shims_change_together_where_one_alone_does_not_help(
     ]
     path = tmp_path / "joint.toml"
     path.write_text("\n".join([two_parts(length=155.0, width=77.9, nodes=(13, 4)), *effects]))
-    scene = read_scene(str(path))
-    assert isinstance(scene, JointScene)
+    scene = scene_at(path)
     patches = patches_of(scene.joint, "5x1")
     session = PlanSession(ShimStudy(scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf), scene))
-    study = session.study
-    assert isinstance(study, ShimStudy)
-    search = ShimSearch(
-        lambda some: [session.answer(q) for q in some], 1, 0, 0.0255, study, (0.038, 0.056, 0.06)
-    )
+    search = search_of(session, 0.0255, (0.038, 0.056, 0.06))
     _, together = search.once(())
     monkeypatch.setattr(ShimSearch, "walked", lambda *_: ((), False))
     _, alone = search.once(())
@@ -516,10 +494,8 @@ class FewFigures(ShimSearch):
         return made
 
 
-def test_growth_gives_what_the_gaps_ask_for_in_all_cases_but_those_that_may_fail(strip: Path) -> None:
+def test_growth_gives_what_the_gaps_ask_for_in_all_cases_but_those_that_may_fail(study: ShimStudy) -> None:
     """And yields plans by their cost, whatever they begin with."""
-    study = session_of(strip, "4x1").study
-    assert isinstance(study, ShimStudy)
     search = FewFigures(lambda some: [], 2, 1, 0.08, study, (0.01, 0.02, 0.03, 0.04, 0.05, 0.06))
     (outcome,) = search.outcomes([()], range(2), 50)
     assert search.thicker((), outcome) == ((0, 0.03), (2, 0.05))
@@ -557,10 +533,8 @@ class OnlyEven(FewFigures):
         return (-0.001 if t.any() else 0.01) + t.max() - t
 
 
-def test_a_walk_passes_through_what_does_not_help(strip: Path) -> None:
+def test_a_walk_passes_through_what_does_not_help(study: ShimStudy) -> None:
     """Never to a plan twice, and never to one that costs too much."""
-    study = session_of(strip, "4x1").study
-    assert isinstance(study, ShimStudy)
     search = OnlyTogether(lambda some: [], 2, 0, 0.08, study, (0.01, 0.02))
     plan, keeps = search.walked((), (inf, inf), (0,))
     assert keeps
@@ -571,9 +545,7 @@ def test_a_walk_passes_through_what_does_not_help(strip: Path) -> None:
     assert best.plan == ((1, 0.01), (2, 0.01))
 
 
-def test_all_shims_get_thinner_together(strip: Path) -> None:
-    study = session_of(strip, "4x1").study
-    assert isinstance(study, ShimStudy)
+def test_all_shims_get_thinner_together(study: ShimStudy) -> None:
     search = OnlyEven(lambda some: [], 2, 0, 0.08, study, (0.01, 0.02, 0.05))
     better = search.better(search.whole(tuple((k, 0.05) for k in range(4))))
     assert better is not None
@@ -596,10 +568,7 @@ def test_contacts_on_a_line_have_the_areas_of_the_first_face(tmp_path: Path) -> 
 
 def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:
     (tmp_path / "half.csv").write_text("x_min,x_max,y_min,y_max\n0,60,0,50\n")
-    study = session_of(strip, str(tmp_path / "half.csv")).study
-    assert isinstance(study, ShimStudy)
-    session = PlanSession(study)
-    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, 0.1, study, STOCK)
+    search = search_of(PlanSession(study_of(strip, str(tmp_path / "half.csv"))), 0.1, STOCK)
     (outcome,) = search.outcomes([((0, 0.02),)], [0], 50)
     inside, beyond = outcome.further[0][:2]
     assert inside < beyond == outcome.largest[0]

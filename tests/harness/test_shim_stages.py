@@ -11,39 +11,21 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import harness
-from small_joints import FASTENERS, GAP, STAGED, two_parts, with_gap
+from shim_studies import search_of, study_of
+from small_joints import FASTENERS, GAP, STAGED, scene_at, two_parts, with_gap
 
 from harness import solve, stresses
 from harness.placement.session import PlanSession, Question
 from harness.series.load_case_source import GapCases
-from harness.shimming.patches import patches_of
-from harness.shimming.shim_search import ShimSearch
-from harness.shimming.study import ShimStudy
-from problems.build import load_case
 from problems.effects.shims import Shims
-from problems.load_cases import Listed
 from problems.model.fastener_forces import fastener_forces
-from problems.model.scene import JointScene
-from problems.model.stage_answers import last_scene
-from problems.scene_files import read_scene
-
-
-def session_of(
-    path: Path, patches: str, limits: tuple[float, float] = (inf, inf), ends: int = 1
-) -> PlanSession:
-    """Of the scene's own gap."""
-    read = read_scene(str(path))
-    assert isinstance(read, JointScene)
-    bare = last_scene(read)
-    cases = Listed((load_case(bare),))
-    return PlanSession(ShimStudy(bare, cases, "dual", patches_of(read.joint, patches), limits, read, ends))
 
 
 def test_a_plan_is_judged_after_the_last_stage(tmp_path: Path) -> None:
     """Gap, force and stress, no less than those of `solve`; shims act in all stages."""
     (tmp_path / "scene.toml").write_text(STAGED, "utf-8")
-    session = session_of(tmp_path / "scene.toml", "2x2", (1e9, 1e9))
-    study = session.study
+    study = study_of(tmp_path / "scene.toml", "2x2", (1e9, 1e9))
+    session = PlanSession(study)
     plan = ((0.0, 0.02), (3.0, 0.01))
     (outcome,) = session.answer(Question((plan,), (0,)))
     (estimated,) = session.answer(Question((plan,), (0,), base=()))
@@ -61,14 +43,14 @@ def test_a_tapered_shim_is_linear_along_its_longer_side(tmp_path: Path) -> None:
     """Two in a row are one ramp, also at the contacts beside their border."""
     path = tmp_path / "scene.toml"
     path.write_text(two_parts(length=200.0, nodes=(21, 5)) + GAP + FASTENERS)
-    joint = read_scene(str(path)).joint  # type: ignore[attr-defined]
+    joint = scene_at(path).joint
     ramp = Shims(kind="shims", thickness=(0.1, 0.3), x=(0.0, 200.0), y=(0.0, 50.0)).gap(joint)
     np.testing.assert_allclose(ramp, -0.1 - 1e-3 * joint.nodes[:, 0], rtol=1e-14)
     upright = Shims(kind="shims", thickness=(0.1, 0.3), x=(0.0, 40.0), y=(0.0, 50.0)).gap(joint)
     covered = joint.nodes[:, 0] <= 40.0
     np.testing.assert_allclose(upright, np.where(covered, -0.1 - 4e-3 * joint.nodes[:, 1], 0.0), rtol=1e-14)
-    study = session_of(path, "2x1", ends=2).study
-    two = sum(study.effect(item).gap(joint) for item in ((0, 0.1, 0.2), (1, 0.2, 0.3)))  # type: ignore[arg-type]
+    study = study_of(path, "2x1", ends=2)
+    two = sum(study.effect(item).gap(joint) for item in ((0, 0.1, 0.2), (1, 0.2, 0.3)))
     np.testing.assert_allclose(two, ramp, rtol=1e-14)
 
 
@@ -76,11 +58,9 @@ def test_a_patch_has_halves_and_neighbours(tmp_path: Path) -> None:
     """Contacts half-way count for both ends; the nearest patch comes first."""
     path = tmp_path / "scene.toml"
     path.write_text(two_parts(length=200.0, nodes=(21, 5)) + GAP + FASTENERS)
-    study = session_of(path, "4x1", ends=2).study
-    assert isinstance(study, ShimStudy)
+    study = study_of(path, "4x1", ends=2)
     assert study.near[[0, 3]].tolist() == [[0, 1, 2, 3], [3, 2, 1, 0]]
-    study = session_of(path, "2x1", ends=2).study
-    assert isinstance(study, ShimStudy)
+    study = study_of(path, "2x1", ends=2)
     x = study.places[:, 0]
     for k, (first, middle, last) in enumerate([(0.0, 50.0, 100.0), (100.0, 150.0, 200.0)]):
         start, end = study.halves[2 * k : 2 * k + 2]
@@ -94,7 +74,7 @@ def test_a_fastener_that_pushes_has_a_force_too(tmp_path: Path, monkeypatch: pyt
     path.write_text(two_parts() + GAP + FASTENERS)
     forces = [{"force_N": -50.0}, {"force_N": 20.0}]
     monkeypatch.setattr("harness.shimming.study.fastener_forces", lambda *_: forces)
-    (outcome,) = session_of(path, "2x1", (100.0, inf)).answer(Question(((),), (0,)))
+    (outcome,) = PlanSession(study_of(path, "2x1", (100.0, inf))).answer(Question(((),), (0,)))
     assert outcome.further[0][-2] == pytest.approx(50.0)
 
 
@@ -114,14 +94,13 @@ def test_a_limit_of_force_needs_a_fastener_in_the_last_stage(tmp_path: Path) -> 
 def test_the_least_of_all_tapered_plans_is_found(tmp_path: Path) -> None:
     path, stock = tmp_path / "scene.toml", (0.02, 0.05)
     path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS)
-    session = session_of(path, "3x1", ends=2)
-    study = session.study
-    assert isinstance(study, ShimStudy)
+    session = PlanSession(study_of(path, "3x1", ends=2))
     kinds = [(), *product(stock, repeat=2)]
     plans = [tuple((float(k), *t) for k, t in enumerate(p) if t) for p in product(kinds, repeat=3)]
-    gaps = {plan: session.answers([plan], (0,), 1e-9)[-1].vectors[1].max() for plan in plans}
+    largest = session.answers(plans, (0,), 1e-9)[-1].vectors[1].max(axis=0)
+    gaps = dict(zip(plans, largest.tolist(), strict=True))
     limit = 0.6 * gaps[()]
-    search = ShimSearch(lambda some: [session.answer(q) for q in some], 1, 0, limit, study, stock)
+    search = search_of(session, limit, stock)
     _, best = search.once(())
     assert best.gap_mm <= limit
     assert search.cost(best.plan) == min(search.cost(plan) for plan, gap in gaps.items() if gap <= limit)
@@ -134,8 +113,7 @@ def test_each_joint_has_tapered_shims_of_its_own(tmp_path: Path) -> None:
     asked = ("--allow-gap", 0.03, "--stock", "0.02,0.05", "--patches", "2x1", "--taper", "--each")
     done = harness("shim", path, *asked, "--cases", 2, "--share", 1, "--out", out)
     assert done.exit_code in (0, 4), done.output
-    scene, study = read_scene(str(path)), session_of(path, "2x1", ends=2).study
-    assert isinstance(scene, JointScene)
+    scene, study = scene_at(path), study_of(path, "2x1", ends=2)
     cases, joints = GapCases(count=2).of(scene, "dual"), pd.read_csv(out / "joints.csv")
     record, pieces = json.loads((out / "shim.json").read_text())["joints"], list[tuple[float, ...]]()
     for k, joint in enumerate(record):
@@ -144,7 +122,7 @@ def test_each_joint_has_tapered_shims_of_its_own(tmp_path: Path) -> None:
         gap = solve(with_gap(replace(scene, effects=effects), cases.load(k).g)).gap.max()
         assert (gap <= 0.03) == joint["kept"] == joints["kept"][k]
         for patch, *ends in joint["plan"]:
-            name = study.patches[int(patch)].name  # type: ignore[attr-defined]
+            name = study.patches[int(patch)].name
             assert [joints[name][k], joints[f"{name}, other end"][k]] == ends
             pieces.append(tuple(sorted(ends)))
     stock = pd.read_csv(out / "stock.csv")

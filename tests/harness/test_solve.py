@@ -258,12 +258,6 @@ def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
     assert "is in the cache" in harness("validate", path).output
 
 
-def test_validate_looks_at_given_matrices() -> None:
-    done = harness("validate", "hard/loads/zero-gap")
-    assert done.exit_code == 0
-    assert "n = 128, m = 64" in done.output
-
-
 def own_scene(path: Path, contacts: int) -> Path:
     np.savez(path, K=np.eye(2), A=np.eye(2, contacts), f=np.full(2, 2.0), g=np.ones(contacts))
     return path

@@ -17,8 +17,9 @@ from small_joints import two_parts
 from harness.measurement.worker import load_cases, scene_to_measure
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
+from harness.scene.answer_record import bound_shown
 from harness.scene.mesh_error import on_mesh
-from harness.scene.solution import solve
+from harness.scene.solution import Solution, solve
 from harness.scene.solve import solve_into
 from harness.terminal import FAILED, GAP_EXCEEDED
 from harness.verification import reference_problem
@@ -30,7 +31,7 @@ from problems.model.joint import Joint
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from report.writers import sheet
-from rivetbench import export, judge, validate
+from rivetbench import export, judge, stresses, validate
 
 EFFECTS = """
 title = "Riveted"
@@ -59,11 +60,16 @@ off = ["clamps"]
 """
 
 
-@pytest.fixture
-def staged(tmp_path: Path) -> Path:
-    path = tmp_path / "staged.toml"
+@pytest.fixture(scope="module")
+def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("staged") / "staged.toml"
     path.write_text(EFFECTS + two_parts(nodes=(9, 5)))
     return path
+
+
+@pytest.fixture(scope="module")
+def answer(staged: Path) -> Solution:
+    return solve(str(staged))
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
@@ -93,8 +99,10 @@ def test_an_answer_to_unproven_approaches_is_not_proven(
         assert problem.reference.bound_mm == np.inf
         x, lam = problem.reference.x, problem.reference.lam
         assert problem.judged(x, lam, 1e-7).verdict == "cannot_be_judged"
-        known = [np.isfinite(stage.gap_error_mm).all() for stage in solve(str(staged)).stages]
-        assert known == [True, True, False]
+        answer = solve(str(staged))
+        assert [np.isfinite(stage.gap_error_mm).all() for stage in answer.stages] == [True, True, False]
+        assert np.isinf(np.concatenate(stresses(answer).errors)).all()
+        assert bound_shown(answer) == np.inf
     proven = open_problem(read_scene(str(staged))).reference
     assert proven.bound_mm <= 1e-9
     assert solve(str(staged)).gap_error_mm.max() <= 1e-7
@@ -112,8 +120,7 @@ def test_what_is_measured_is_the_last_stage(staged: Path, tmp_path: Path) -> Non
     np.testing.assert_array_equal(load.f, open_problem(read_scene(str(staged))).load.f)
 
 
-def test_export_is_the_last_stage(staged: Path, tmp_path: Path) -> None:
-    answer = solve(str(staged))
+def test_export_is_the_last_stage(staged: Path, answer: Solution, tmp_path: Path) -> None:
     files = export(staged, tmp_path / "last.npz", format="npz")
     again = solve(str(files))
     assert abs(again.x - answer.x).max() <= 1e-10
@@ -122,7 +129,7 @@ def test_export_is_the_last_stage(staged: Path, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("blank_pictures")
 def test_the_history_is_in_all_that_solve_writes(
-    staged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    staged: Path, answer: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The clamped parts keep the limit, the released ones do not: the exit code is that of the last stage."""
     pages: list[sheet._Page] = []
@@ -133,7 +140,7 @@ def test_the_history_is_in_all_that_solve_writes(
             pages.append(self)
 
     monkeypatch.setattr(sheet, "_Page", Kept)
-    answer, told, out = solve(str(staged)), StringIO(), tmp_path / "out"
+    told, out = StringIO(), tmp_path / "out"
     largest = [stage.gap.max() for stage in answer.stages]
     limit = (largest[1] + largest[2]) / 2
     assert largest[0] < limit < largest[2]
@@ -162,9 +169,8 @@ def test_the_history_is_in_all_that_solve_writes(
 
 
 def test_a_stage_that_is_not_proven_fails_the_answer(
-    staged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    staged: Path, answer: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    answer = solve(str(staged))
     first, *others = answer.stages
     doubtful = replace(first, judgement=replace(first.judgement, verdict="cannot_be_judged"))
     monkeypatch.setattr("report.writers.answer_report.write", lambda folder: folder / "answer.md")
@@ -174,9 +180,8 @@ def test_a_stage_that_is_not_proven_fails_the_answer(
     assert solve_into(str(staged), None, 1e-9, tmp_path / "out", Console(file=StringIO())) == FAILED
 
 
-def test_mesh_error_goes_through_the_stages(staged: Path) -> None:
+def test_mesh_error_goes_through_the_stages(answer: Solution) -> None:
     """On its own mesh nothing moves, though the approaches are reached anew."""
-    answer = solve(str(staged))
     assert isinstance(answer.scene, JointScene)
     assert isinstance(answer.scene.joint, Joint)
     assert on_mesh(answer, answer.scene.joint)[0] <= 1e-9

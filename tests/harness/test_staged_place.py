@@ -1,6 +1,7 @@
 """Plans of fasteners that stages set and take out: the gap after the last stage, against `solve`."""
 
 import json
+import pickle
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -9,25 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import harness
-from small_joints import STAGED
+from small_joints import STAGED, scene_at
 
 from harness import solve
-from harness.measurement.scheduler import workers
-from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, without_fasteners
-from harness.placement.plan_search import Step
-from harness.placement.search import Search
-from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question
+from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question, answer
 from harness.results import series_file
 from harness.scene.scene_file import MOVED, edited, with_fasteners
-from harness.terminal.console import console_of
 from problems.errors import InputError
 from problems.forms import Form
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene
 from problems.model.stage_answers import stage_scenes
-from problems.reporter import SILENT
-from problems.scene_files import read_scene
 
 CASES = 2
 
@@ -55,7 +49,7 @@ def gap_after_release(scene: JointScene, plan: Plan, seed: float | str) -> tuple
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_a_plan_leaves_what_the_last_stage_leaves(path: Path, form: Form) -> None:
     """Proven upper bounds, and estimates from another plan."""
-    movable = MovableFasteners.of(read_scene(str(path)))
+    movable = MovableFasteners.of(scene_at(path))
     cases = random_gaps(movable.bare, CASES, 0, form=form)
     session = PlanSession(FastenerStudy(movable.bare, cases, form, movable))
     for plan in ((), ((15.0, 30.0), (65.0, 20.0))):
@@ -73,7 +67,7 @@ def test_a_plan_leaves_what_the_last_stage_leaves(path: Path, form: Form) -> Non
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_fasteners_lock_the_answer_that_is_proven(path: Path, form: Form) -> None:
     """To the last bit: another sum for the approach may be off by more than the bound of that answer."""
-    movable = MovableFasteners.of(read_scene(str(path)))
+    movable = MovableFasteners.of(scene_at(path))
     cases = random_gaps(movable.bare, CASES, 0, form=form)
     session = PlanSession(FastenerStudy(movable.bare, cases, form, movable))
     stages = session.answers([movable.current], range(CASES), TOLERANCE_MM)
@@ -90,7 +84,7 @@ def test_a_stage_that_locks_what_is_not_proven_proves_no_plan(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Though the last stage is proven, for the approaches that it has been given."""
-    movable = MovableFasteners.of(read_scene(str(path)))
+    movable = MovableFasteners.of(scene_at(path))
     session = PlanSession(FastenerStudy(movable.bare, random_gaps(movable.bare, CASES, 0), "dual", movable))
     question = Question((movable.current,), (0, 1))
     assert max(session.answer(question)[0].largest) < 1.0
@@ -110,14 +104,14 @@ def test_a_stage_that_locks_what_is_not_proven_proves_no_plan(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("blank_pictures")
 def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
     """Of the command, whose plan.toml has the stages, and whose series goes through them."""
     out = tmp_path / "out"
     command = "place", path, "--candidates", "2x2", "--cases", CASES, "--share", 1, "--count", 2, "--out", out
     assert harness(*command).exit_code == 0
     record = json.loads((out / "place.json").read_text())
-    scene = read_scene(str(path))
-    assert isinstance(scene, JointScene)
+    scene = scene_at(path)
     cases = random_gaps(MovableFasteners.of(scene).bare, CASES, 0)
     seeds = [cases.parameters(k)["gap_seed"] for k in range(CASES)]
     gaps = {
@@ -127,8 +121,7 @@ def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
     best = min(gaps, key=lambda plan: gaps[plan])
     assert tuple(map(tuple, record["best"]["plan"])) == best
     assert record["best"]["gap_mm"] == pytest.approx(gaps[best], abs=2e-7)
-    written = read_scene(str(out / "plan.toml"))
-    assert isinstance(written, JointScene)
+    written = scene_at(out / "plan.toml")
     assert written.stages == scene.stages
     assert MovableFasteners.of(written).current == best
     rows = {row["case"]: row for row in series_file.rows(out / "plan")}
@@ -138,28 +131,19 @@ def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
     assert "after stage release" in (out / "report" / "report.md").read_text()
 
 
-@pytest.mark.slow
-def test_workers_find_the_same(path: Path, tmp_path: Path, cluster: Any) -> None:
-    movable = MovableFasteners.of(read_scene(str(path)))
-    bare, holes = movable.bare, plan_of(grid(movable.bare, 2, 2))
-    study = FastenerStudy(bare, random_gaps(bare, CASES, 0), "dual", movable)
-    nodes = PlanSession(study).last.data.assembly.contact_nodes
-    assert nodes is not None
-
-    def searched(name: str, pool: Any = None) -> list[Step]:
-        journal = AnswerJournal(study, tmp_path / name, {"plans": "of tacks"}, pool)
-        return Search(journal, CASES, 0, 0.0, bare, nodes, holes).once(movable.current, 2)[0]
-
-    whole = searched("whole")
-    with workers(cluster.scheduler_address, console_of(SILENT)) as pool:
-        assert searched("workers", pool) == whole
+def test_a_worker_answers_the_same(path: Path) -> None:
+    """It is sent the study with the cases of the question alone, and opens the stages anew."""
+    movable = MovableFasteners.of(scene_at(path))
+    study = FastenerStudy(movable.bare, random_gaps(movable.bare, CASES, 0), "dual", movable)
+    question = Question((movable.current, ()), (1,))
+    task = replace(study, cases=study.cases.only(question.cases)), question
+    assert answer(pickle.loads(pickle.dumps(task))) == PlanSession(study).answer(question)
 
 
 def test_a_plan_without_fasteners_has_stages_without_them(path: Path, tmp_path: Path) -> None:
     written = tmp_path / "plan.toml"
     written.write_text(edited(str(path), tmp_path, with_fasteners(()), MOVED), "utf-8")
-    scene = read_scene(str(written))
-    assert isinstance(scene, JointScene)
+    scene = scene_at(written)
     assert [(stage.name, stage.on, stage.off) for stage in scene.stages] == [
         ("tack", (), ()),
         ("shim and rivet", ("shim", "rivets[0:2]"), ()),
@@ -171,7 +155,7 @@ def test_a_plan_without_fasteners_has_stages_without_them(path: Path, tmp_path: 
 def test_holes_may_be_those_of_rivets(path: Path, tmp_path: Path) -> None:
     """Which are set where a fastener presses, or in its place."""
     (tmp_path / "holes.csv").write_text("x,y\n20,10\n50,25\n10,40\n")
-    movable = MovableFasteners.of(read_scene(str(path)))
+    movable = MovableFasteners.of(scene_at(path))
     assert len(movable.candidates(str(tmp_path / "holes.csv"))[0]) == 3
 
 
@@ -190,4 +174,4 @@ def test_fasteners_that_cannot_move(path: Path, old: str, new: str, said: str) -
         text = text.replace('on = ["shim", ', 'on = ["tacks[2:3]", "shim", ')
     path.write_text(text, "utf-8")
     with pytest.raises(InputError, match=said):
-        MovableFasteners.of(read_scene(str(path)))
+        MovableFasteners.of(scene_at(path))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from commands import harness
 from riveted_strips import FORCE, STIFFNESS, approach, strips
-from small_joints import POINTS, STAGED
+from small_joints import POINTS, STAGED, scene_at
 from strip_scene import STRIP
 
 from harness.placement.candidates import MovableFasteners
@@ -26,7 +26,6 @@ from problems.forms import Form
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
-from problems.scene_files import read_scene
 from rivetbench import run_series
 
 RIVETS = 'name = "rivets"\npreload = 30.0\n'
@@ -44,12 +43,6 @@ OF_K = {"installed_fasteners.0.stiffness": "2 of uniform(8e4, 4e4)"}
 def scene_file(folder: Path, text: str = STAGED) -> Path:
     (folder / "scene.toml").write_text(text, "utf-8")
     return folder / "scene.toml"
-
-
-def joint_scene(path: Path) -> JointScene:
-    scene = read_scene(str(path))
-    assert isinstance(scene, JointScene)
-    return scene
 
 
 def random(laws: dict[str, str]) -> tuple[str, ...]:
@@ -90,7 +83,7 @@ def test_a_case_is_the_scene_with_its_numbers(tmp_path: Path) -> None:
     text = STAGED.replace(RIVETS, 'name = "rivets"\n').replace(
         "[[10.0, 40.0]]", "[[10.0, 40.0], [80.0, 10.0]]"
     )
-    scene = joint_scene(path := scene_file(tmp_path, text))
+    scene = scene_at(path := scene_file(tmp_path, text))
     cases, options = GapCases(count=2, random=random(LAWS | OF_K)), SeriesOptions(check=0)
     done = run_series(path, tmp_path / "out", cases, options, report=False)
     assert done.code == 0
@@ -124,7 +117,7 @@ def test_spring_back_of_a_linear_joint() -> None:
 
 
 def test_without_scatter_it_is_the_plain_series(tmp_path: Path) -> None:
-    scene = joint_scene(scene_file(tmp_path))
+    scene = scene_at(scene_file(tmp_path))
     still = {"fasteners.preload": "each normal(400, 1e-300)", "shims.thickness": "uniform(0.02, 1e-300)"}
     still |= {"installed_fasteners.0.preload": "normal(30, 1e-300)"}
     still |= {"installed_fasteners.1.approach": "normal(0.03, 1e-300)"}
@@ -148,14 +141,14 @@ def test_one_stage_is_the_scene_without_stages(tmp_path: Path) -> None:
 
 
 def test_cases_do_not_depend_on_order_worker_form_or_the_column_that_sets_them(tmp_path: Path) -> None:
-    scene = joint_scene(scene_file(tmp_path))
+    scene = scene_at(scene_file(tmp_path))
     whole = results_of(job := job_of(scene, LAWS))
     (tmp_path / "rivets.csv").write_text(
         "x,y,stage\n20,10,shim and rivet\n50,25,shim and rivet\n80,40,rivet\n"
     )
     head, tail = STAGED.replace(', "rivets[0:2]"', "").replace('on = ["rivets[2:3]"]', "").split(RIVETS)
     tail = tail.replace(POINTS, 'file = "rivets.csv"', 1)
-    listed = job_of(joint_scene(scene_file(tmp_path, head + RIVETS + tail)), LAWS, form="sparse")
+    listed = job_of(scene_at(scene_file(tmp_path, head + RIVETS + tail)), LAWS, form="sparse")
     sent = replace(pickle.loads(pickle.dumps(job)), cases=job.cases.only([1, 0]))
     for some in ({one.row["case"]: one for one in solve_on_worker((sent, [1, 0]))}, results_of(listed)):
         for k, (row, gap) in some.items():
@@ -174,7 +167,7 @@ def test_what_a_stage_locks_is_not_drawn(tmp_path: Path) -> None:
 def test_searches_draw_what_a_series_draws(tmp_path: Path) -> None:
     """The largest gaps of the scene's own tacks, and without further shims; the largest of the forces."""
     text = STAGED.replace("[[10.0, 40.0]]", "[[50.0, 10.0], [90.0, 10.0]]")
-    scene = joint_scene(scene_file(tmp_path, text))
+    scene = scene_at(scene_file(tmp_path, text))
     movable, patches = MovableFasteners.of(scene), patches_of(scene.joint, "1x1")
     job = job_of(scene, {name: law for name, law in LAWS.items() if not name.startswith("fasteners")})
     rows = [row for row, _ in results_of(job).values()]

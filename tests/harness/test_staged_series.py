@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import harness
-from small_joints import STAGED, with_gap
+from small_joints import STAGED, scene_at, with_gap
 
 from harness.results import series_file
 from harness.scene.solution import solve
@@ -15,10 +15,10 @@ from harness.series.load_case_source import GapCases
 from harness.series.session import Job
 from harness.series.staged import StagedSession
 from harness.verification.judge import LIMIT_MM
+from problems.build import load_case
 from problems.forms import Form
 from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
-from problems.scene_files import read_scene
 
 COUNT = 3
 
@@ -29,13 +29,13 @@ def scene(tmp_path: Path) -> Path:
     return tmp_path / "scene.toml"
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.parametrize(("form", "solver"), [("dual", "newton"), ("sparse", "newton"), ("primal", "piqp")])
 def test_each_case_goes_through_all_stages(scene: Path, tmp_path: Path, form: Form, solver: str) -> None:
     command = "series", scene, "--cases", COUNT, "--form", form, "--solver", solver, "--out", tmp_path / "s"
     assert harness(*command, "--limit", 1e-6, "--tolerance", 1e-10).exit_code == 0
-    read = read_scene(str(scene))
-    assert isinstance(read, JointScene)
-    shims = solve(replace(read, stages=())).problem.load.g - solve(without_shims(read)).problem.load.g
+    read = scene_at(scene)
+    shims = load_case(replace(read, stages=())).g - load_case(without_shims(read)).g
     cases = GapCases(count=COUNT).of(last_scene(read), form)
     rows = sorted(series_file.rows(tmp_path / "s"), key=lambda row: row["case"])
     assert len(rows) == COUNT
@@ -50,8 +50,7 @@ def test_each_case_goes_through_all_stages(scene: Path, tmp_path: Path, form: Fo
 
 def test_a_shim_of_a_later_stage_leaves_the_measured_gap_of_the_first(scene: Path, tmp_path: Path) -> None:
     """Each stage of a row of a table is that of the scene with a scan of its gaps."""
-    read = read_scene(str(scene))
-    assert isinstance(read, JointScene)
+    read = scene_at(scene)
     row = np.random.default_rng(2).uniform(0.02, 0.08, read.joint.size[1])
     np.save(tmp_path / "gaps.npy", row[None])
     cases = GapCases(gaps=tmp_path / "gaps.npy").of(read, "dual")
@@ -66,8 +65,7 @@ def test_a_shim_of_a_later_stage_leaves_the_measured_gap_of_the_first(scene: Pat
 def test_a_gap_after_what_is_locked_unproven_is_not_known(
     scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    read = read_scene(str(scene))
-    assert isinstance(read, JointScene)
+    read = scene_at(scene)
     job = Job(scene=read, cases=GapCases(count=1).of(last_scene(read), "dual"), form="dual", check=0)
     known, unknown = [], []
     for rows, limit_mm in ((known, LIMIT_MM), (unknown, 0.0)):

@@ -231,9 +231,10 @@ class TestOverrides:
         plugin = tmp_path / "mine.py"
         plugin.write_text(tiny_joint.EXACT)
         suite = suite.model_copy(update={"solver": suite.solver[1:]})
-        changed = overridden(suite, Overrides(plugin=plugin))
-        assert [entry.name for entry in changed.solver] == ["piqp", "mine"]
-        assert changed.plugin == str(plugin)
+        for given in (plugin, str(plugin)):
+            changed = overridden(suite, Overrides(plugin=given))
+            assert [entry.name for entry in changed.solver] == ["piqp", "mine"]
+            assert changed.plugin == str(plugin)
         assert [e.name for e in overridden(suite, Overrides(plugin=plugin, solvers=("mine",))).solver] == [
             "mine"
         ]

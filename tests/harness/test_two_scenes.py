@@ -12,6 +12,7 @@ from small_joints import two_parts
 from superelements import write_part
 
 from harness.cli.scene import STARTER
+from harness.results.records import read_arrays
 from harness.scene.two_scenes import common_places
 from problems.build import load_case, prepared
 from problems.model.fastener_forces import fastener_forces
@@ -43,6 +44,11 @@ def write(path: Path, text: str) -> Path:
 def rows(path: Path) -> list[dict[str, str]]:
     with path.open() as file:
         return list(csv.DictReader(file))
+
+
+def gaps_of(both: Path) -> list[np.ndarray]:
+    """The gaps that remain in each of two scenes."""
+    return [read_arrays(both / name / "solution.npz")["gap_after"] for name in ("first", "second")]
 
 
 @pytest.mark.usefixtures("without_pictures")
@@ -78,10 +84,7 @@ def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path, monkeypatch:
     done = harness("solve", first, second, "--out", tmp_path / "both", "--allow-gap", 0.29)
     assert done.exit_code == 0, done.output  # the first alone has a gap of 0.3 mm
     assert "-0 " not in done.output
-    gaps = []
-    for name in ("first", "second"):
-        with np.load(tmp_path / "both" / name / "solution.npz") as saved:
-            gaps.append(saved["gap_after"])
+    gaps = gaps_of(tmp_path / "both")
     table = rows(tmp_path / "both" / "contacts.csv")
     np.testing.assert_array_equal([float(row["change_mm"]) for row in table], gaps[1] - gaps[0])
     np.testing.assert_array_equal([float(row["gap_after_first_mm"]) for row in table], gaps[0])
@@ -178,10 +181,7 @@ def test_the_mesh_decides_a_verdict_near_the_limit(tmp_path: Path) -> None:
     first = write(tmp_path / "coarse.toml", JOINT + FASTENERS)
     second = write(tmp_path / "fine.toml", (JOINT + FASTENERS).replace("nodes = [9, 5]", "nodes = [17, 9]"))
     harness("solve", first, second, "--out", tmp_path / "once")
-    gaps = []
-    for name in ("first", "second"):
-        with np.load(tmp_path / "once" / name / "solution.npz") as saved:
-            gaps.append(saved["gap_after"])
+    gaps = gaps_of(tmp_path / "once")
     at_coarse = gaps[1].reshape(9, 17)[::2, ::2].ravel()
     table = rows(tmp_path / "once" / "contacts.csv")
     change = np.array([float(row["change_mm"]) for row in table])

@@ -15,6 +15,7 @@ from harness.scene.answer_record import summary as said_of
 from harness.scene.solve import solve_into
 from harness.series.run import summary
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
 K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
 
 

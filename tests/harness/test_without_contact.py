@@ -51,6 +51,7 @@ def answered(path: Path, out: Path, solver: str | None = None) -> dict[str, Any]
         return json.loads((out / "solution.json").read_text()) | dict(arrays)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_part_alone_is_a_linear_solve(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
     monkeypatch.setattr(
@@ -98,14 +99,14 @@ def test_a_series_says_so_too(name: str) -> None:
         list(solve_series(scene, [LoadCase(np.ones(1), np.zeros(0))], name))
 
 
-@pytest.mark.parametrize("A", [np.zeros((1, 0)), np.ones((1, 1))], ids=["without", "with contact"])
 @pytest.mark.filterwarnings("ignore:overflow encountered")
-def test_displacements_that_overflow_are_refused(A: np.ndarray) -> None:
-    scene = own_matrices([[1e-10]], A, [1e300], np.zeros(A.shape[1]))
+def test_displacements_that_overflow_are_refused() -> None:
+    scene = own_matrices([[1e-10]], np.zeros((1, 0)), [1e300], [])
     with pytest.raises(InputError, match=r"largest \|f\| = 1e\+300: loads with finite displacements"):
         solve(scene)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.parametrize("form", ["npz", "mtx"])
 def test_there_and_back(form: str, path: Path) -> None:
     """And the matrices, solved by themselves, give the same displacements."""

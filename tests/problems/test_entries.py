@@ -130,6 +130,8 @@ def test_text_of_any_program(form: str) -> None:
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,\n,2,,-1\n", "K.pch", "point 2, component 0.*cut off"),
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,0\n", "K.pch", "line 2 = '0'"),
         (b"DMIG,K,0,6,2,0\nINCLUDE 'f.pch'\n", "K.pch", "line 2 = .INCLUDE .*not followed"),
+        (b"DMIG,K,0,6,2,0\n  include 'f.pch'\n", "K.pch", "line 2 = .*include .*not followed"),
+        (text("mtx", [(1, 1, 4.0), (2, 1, np.nan)]), "K.mtx", r"K\[\d, \d\] = .NaN or infinity"),
         (text("dmig", LOWER) * 2, "K.pch", "line 7, a header of = 'KAA': also in line 2"),
         (b"%%MatrixMarket matrix array real skew-symmetric\n2 2\n1.0\n", "K.mtx", r"= \[-1.0, 1.0\]: K must"),
         (b"%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "K.mtx", "pattern entries"),

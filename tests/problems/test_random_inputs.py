@@ -18,7 +18,7 @@ from problems.effects.fasteners import Fasteners
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.load_cases.random_inputs import RandomInputs
-from problems.load_cases.sweep import sweep
+from problems.load_cases.sweep import keys_of, sweep
 from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
 
@@ -161,6 +161,12 @@ def test_a_pattern_whose_points_act_one_by_one_is_not_drawn(tmp_path: Path) -> N
         drawn(patterned(tmp_path, 'name = "tacks"\n', stages), law)
     together = '[[stage]]\nname = "1"\non = ["tacks"]\n'
     assert drawn(patterned(tmp_path, 'name = "tacks"\n', together), law).count == 20
+
+
+def test_a_truth_value_is_no_number_to_draw(tmp_path: Path) -> None:
+    scene = patterned(tmp_path)
+    assert isinstance(scene, JointScene)
+    assert "fasteners.pattern.on_nodes" not in keys_of(scene)
 
 
 BAD = [

@@ -77,6 +77,18 @@ def test_a_load_changes_the_key_of_the_scene_alone_the_structure_both(
     assert (assembly_key == other_assembly) is (change in LOADS)
 
 
+def test_the_files_that_an_assembly_names_are_those_of_the_scene(path: Path) -> None:
+    """No output may replace them."""
+    folder = path.parent / "parts"
+    folder.mkdir()
+    (folder / "holes.csv").write_text("x,y\n10,20\n90,30\n")
+    joint = SCENE.partition("[joint]\n")[2].partition("[[effect]]")[0].replace("joint.part", "part")
+    fasteners = '[[effect]]\nkind = "fasteners"\npreload = 1000.0\nfile = "holes.csv"\n'
+    (folder / "joint.toml").write_text(joint + fasteners)
+    path.write_text('assembly = "parts/joint.toml"\n')
+    assert read_scene(str(path)).sources == (path, folder / "joint.toml", folder / "holes.csv")
+
+
 # --- bad input ----------------------------------------------------------------------------------------
 
 BAD = [
@@ -92,6 +104,7 @@ BAD = [
     (("lines = [60.0]", "lines = [210.5]"), "effect[3] (ribs).lines[0]", 210.5, "0 … 210"),
     (('part = "a"\nlines', 'part = "c"\nlines'), "effect[3] (ribs).part", "c", "['a']"),
     (("I = 2e3", "I = 2e3\nJ = inf"), "effect[3] (ribs).J", float("inf"), "finite"),
+    (('[["a", "tool"]]', "[]"), "contacts", [], "at least 1 item"),
     (('[["a", "tool"]]', '[["a", "b"]]'), "contacts", ["a", "b"], "two different parts"),
     (('contacts = [["a", "tool"]]\n', ""), "effect[0] (initial_gap).between", None, "needs a contact"),
     (('[["a", "tool"]]', '[["a", "tool"], ["a", "tool"]]'), "contacts", None, "no pair twice"),

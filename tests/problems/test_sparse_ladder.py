@@ -114,6 +114,7 @@ def test_the_report_says_how_far_ours_is_from_the_fastest_library(tmp_path: Path
 
     rows = [of(f"isotonic/500-{k}", "newton", seconds) for k, seconds in enumerate((1.0, 2.0, 8.0))]
     rows += [of(f"isotonic/500-{k}", "osqp", 2.0) for k in (0, 1)]
+    rows += [of("isotonic/500-2", "osqp", 2.0, verdict="outside")]
     rows += [of("isotonic/500-1", "scs", 1.0), of("isotonic/500-0", "scs", 0.1, verdict="outside")]
     first = shown(table(section(results(tmp_path / "a", rows)), "sparse"))[1:]
     figures = ["3", "3", "2.00", "4.00", "0.500", "2.00"]
@@ -122,3 +123,12 @@ def test_the_report_says_how_far_ours_is_from_the_fastest_library(tmp_path: Path
     last = shown(table(section(results(tmp_path / "b", rows)), "sparse"))[-1]
     assert last == ["newton (sparse)", "all", "4", "3", "5.00", "∞", "1.25", "∞"]
     assert section(results(tmp_path / "c", [row()])) is None
+
+
+def test_a_problem_that_no_library_was_run_on_is_none_that_they_missed(tmp_path: Path) -> None:
+    ours, library = (
+        row("1/1", name, "sparse") | {"scene": "sparse/isotonic/500-0"} for name in ("newton", "osqp")
+    )
+    rows = [ours, library | no_answer("not_run")]
+    (_, line, _) = shown(table(section(results(tmp_path, rows)), "sparse"))
+    assert line[-2:] == ["–", "–"]

@@ -18,6 +18,7 @@ from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Matrix
+from problems.load_cases.sweep import keys_of
 from problems.model.fastener_forces import fastener_forces
 from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene
@@ -253,6 +254,27 @@ def test_effects_of_a_scene_keep_the_stages_of_their_points(tmp_path: Path) -> N
     more = scene.effects[2].model_copy(update={"points": tuple(map(tuple, RIVETS))})
     with pytest.raises(InputError, match=r"points = '4 points': 2 points: the column stage"):
         joint_scene(table | {"effect": [*scene.effects[:2], more]})
+
+
+def test_the_order_of_stages_that_files_name_is_in_the_key(tmp_path: Path) -> None:
+    (tmp_path / "rivets.csv").write_text("x,y,stage\n60,20,first\n140,30,second\n")
+    from_file = {"kind": "installed_fasteners", "file": str(tmp_path / "rivets.csv")}
+    orders = ["first", "second"], ["second", "first"]
+    scenes = [joined([{"name": name} for name in order], [EFFECTS[0], from_file]) for order in orders]
+    assert scenes[0].key != scenes[1].key
+
+
+def test_no_column_of_its_file_sets_a_gap_in_a_stage(tmp_path: Path) -> None:
+    """It acts as a whole: before that stage the gap would be 0."""
+    (tmp_path / "gap.csv").write_text("x,y,gap,stage\n0,0,0.5,clamp\n400,0,0.5,clamp\n0,120,0.5,clamp\n")
+    gap = {"kind": "measured_gap", "file": str(tmp_path / "gap.csv")}
+    with pytest.raises(InputError, match=r"measured_gap\).file = 'a column stage': .*acts as a whole"):
+        joined(ONCE, [gap, *EFFECTS[1:]])
+
+
+def test_a_shift_of_rivets_that_a_stage_sets_gives_them_no_approach() -> None:
+    scene = joined(ONCE)
+    assert keys_of(scene, stiffness=True)["installed_fasteners.points.x"].faults(scene, 1.0, "--find") == []
 
 
 PIN = [[390.0, 100.0]]

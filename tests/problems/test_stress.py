@@ -1,6 +1,7 @@
 """Stresses of plates against closed forms (Timoshenko and Woinowsky-Krieger 1959), and their errors."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -195,6 +196,16 @@ def test_a_stress_that_overflows_passes_no_limit(monkeypatch: pytest.MonkeyPatch
         assert (record["exceeded"], record["kind"]) == (None, "")
         monkeypatch.setattr("harness.scene.stress.stresses_of", lambda *_, of=found: of.parts)
         assert largest_of(read_scene("gallery/padded-panel"), np.zeros(1)) == np.inf  # type: ignore[arg-type]
+
+
+def test_a_part_of_which_no_stress_is_told_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces at points act near all of its elements: a PASS is of the other part alone."""
+    (told,), (near,) = (made((stress, 0.0, 0.0)).parts for stress in (1.0, 900.0))
+    near = replace(near, part="doubler", near_force=np.ones(1, dtype=bool))
+    record = stress_record(Stresses((told, near), (np.zeros(1), np.zeros(1))), None, 100.0)
+    assert (record["kind"], "none known of doubler" in record["said"]) == ("pass", True)
+    monkeypatch.setattr("harness.scene.stress.stresses_of", lambda *_: (near,))  # alone it passes no limit
+    assert largest_of(read_scene("gallery/padded-panel"), np.zeros(1)) == np.inf  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["three-part-stack", "padded-panel", "heavy-sheet-on-tool"])

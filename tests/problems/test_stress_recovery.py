@@ -13,11 +13,13 @@ from superelements import Array, Tables, flat, scene_from, two_plates, write_par
 
 from harness.scene.solution import solve
 from harness.scene.stress import refuse_unusable, stresses, stresses_of
+from harness.shimming.study import ShimStudy
 from harness.verification.reference import proof_of
 from problems.build import model_of
 from problems.errors import Fault, InputError
 from problems.formats.matrix_text import write_matrix_market
 from problems.formats.nastran import pyyeti
+from problems.load_cases import Listed
 from problems.model.condensed_plate import CondensedPlate
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
@@ -118,6 +120,7 @@ def test_a_stress_is_as_near_as_is_said(tmp_path: Path) -> None:
 
 def point_matrix(folder: Path, S: Any, csv: str, **more: Any) -> list[Tables]:
     """Two good parts of six nodes; the first has this S and table of points."""
+    folder.mkdir(exist_ok=True)
     xyz = flat(np.column_stack([each.ravel() for each in np.meshgrid([0.0, 10.0, 20.0], [0.0, 10.0])]))
     parts = [write_part(folder, name, np.diag(np.arange(40.0, 46.0)), xyz) for name in "ab"]
     np.savez(folder / "s.npz", **S) if isinstance(S, dict) else np.savez(folder / "s.npz", S)
@@ -145,6 +148,16 @@ WRONG: dict[str, tuple[Any, str, str, str, str, str]] = {
         "S, or one matrix alone",
     ),
 }
+
+
+def test_a_search_for_shims_does_not_go_on_with_another_recovery_matrix(tmp_path: Path) -> None:
+    """Its answers have the stresses of the first, and no key of a scene tells it from the second."""
+    scenes = [scene_from(point_matrix(tmp_path / name, S, TWO)) for name, S in (("1", GOOD), ("2", 2 * GOOD))]
+    one, other = (
+        ShimStudy(scene, Listed(()), "dual", (), (np.inf, 50.0), scene).identity for scene in scenes
+    )
+    assert one["scene_key"] == other["scene_key"]
+    assert one["stresses"] != other["stresses"]
 
 
 @pytest.mark.parametrize("case", WRONG)

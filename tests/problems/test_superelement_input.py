@@ -11,6 +11,7 @@ from superelements import Array, Tables, flat, scene_from, solved, with_bay, wri
 from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.load_cases.measured_gaps import measured_gaps
+from problems.load_cases.random_gaps import random_gaps
 
 X, Y = (each.ravel() for each in np.meshgrid(np.linspace(0, 100, 6), np.linspace(0, 50, 4)))
 NODES = flat(np.column_stack([X, Y]))
@@ -239,3 +240,9 @@ def test_a_field_too_fine_for_the_grid_and_contacts_of_unknown_parts(tmp_path: P
     assert "at least 0.6 mm" in fault.allowed
     (fault,) = refused(two(tmp_path), contacts=[["a", "c"]])
     assert fault.key == "contacts"
+
+
+def test_a_series_of_fields_too_fine_for_the_grid_is_refused(tmp_path: Path) -> None:
+    """As of a length in metres: the matrices of its grid would take all memory."""
+    with pytest.raises(InputError, match=r"initial_gap\.random\.correlation_length = 0\.1: at least 0\.6 mm"):
+        random_gaps(scene_from(two(tmp_path)), 1, 0, mean=0.1, sd=0.1, correlation_length=0.1)

@@ -279,6 +279,20 @@ def test_missing_marks_and_headings_hold_for_a_scan_and_for_gaps(tmp_path: Path)
         assert "1 missing gaps" in cases.notes[0]
 
 
+def test_a_mark_is_a_mark_in_the_unit_of_its_file(tmp_path: Path) -> None:
+    """-1000 µm are -1 mm, and no -1."""
+    header = ",".join(f"c{k} [\u00b5m]" for k in range(9))
+    (tmp_path / "g.csv").write_text(f"{header}\n{','.join(['250'] * 8)},-1000\n")
+    cases = measured_gaps(SCENE, tmp_path / "g.csv", options=TableOptions(missing=(-1.0,)))
+    assert cases.gaps.tolist() == [[0.25] * 8 + [-1.0]]
+
+
+def test_a_mark_is_a_mark_in_single_precision(tmp_path: Path) -> None:
+    np.save(tmp_path / "g.npy", np.array([[0.25] * 8 + [1e20]], dtype=np.float32))
+    cases = measured_gaps(SCENE, tmp_path / "g.npy", options=TableOptions(missing=(1e20,)))
+    assert cases.gaps.tolist() == [[0.25] * 9]
+
+
 def test_lines_above_a_table_are_skipped(tmp_path: Path) -> None:
     (tmp_path / "scan.csv").write_text("x,y,gap\nnot these\nx,y,gap\n0,0,1\n9,0,1\n0,9,9999\n0,9,1\n")
     table = {"kind": "measured_gap", "file": "scan.csv", "skip_lines": 2, "missing": [9999]}

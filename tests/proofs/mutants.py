@@ -304,6 +304,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "binom.cdf(c, n, q) <= alpha / 2": ("binom.cdf(c, n, q) <= alpha",),
         "cases, 1 - self.share) <= alpha / 2": ("cases, 1 - self.share) <= alpha",),
         "ALPHA / 2 ** (len(samples) + 1)": ("ALPHA / 2",),
+        "count - len(known)": ("0",),
     },
     "harness/series/derivatives.py": {
         " - dg[C]": ("",),
@@ -376,6 +377,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "max(1.0, 1.5 * (1 - nu)) * s**2": ("0.001 * s**2",),
         "x**2 - x * y + y**2": ("x**2 + y**2",),
     },
+    "problems/model/scene.py": {"names + order": ("names",)},
     "problems/model/stages.py": {
         "acting = frozenset(everything) - self.staged": ("acting = frozenset(everything)",),
         "acting -= elements": ("pass",),
@@ -460,6 +462,7 @@ TESTS = {
     "problems/model/fastener_forces.py": ("problems/test_effects.py",),
     "problems/model/joint_model.py": ("problems/test_stages.py",),
     "problems/model/stage_answers.py": ("problems/test_stages.py",),
+    "problems/model/scene.py": ("problems/test_stages.py",),
     "problems/model/stages.py": ("problems/test_stages.py",),
     "harness/scene/stress.py": ("problems/test_stress.py",),
     "problems/model/stress.py": ("problems/test_stress.py",),

@@ -5,14 +5,15 @@ from typing import Any
 
 import pytest
 from matplotlib.image import imread
-from synthetic_results import HIGH, LOW, answer, no_answer, results, row, shown, sweep, table, write_rows
+from synthetic_results import HIGH, LOW, answer, no_answer, results, row, shown, sweep, table
 
 from report.analysis.standings import best_tolerances, cells_of_curves, fastest_first, with_errors
 from report.document.blocks import Figure
+from report.figures import style
 from report.page.run_page_data import run_data
 from report.results.reader import Results
 from report.sections import accuracy, summary
-from report.writers.suite_report import write
+from report.writers.sections_writer import written
 
 
 def changed(rows: list[dict[str, Any]], solver: str, **figures: Any) -> list[dict[str, Any]]:
@@ -28,14 +29,16 @@ def advised(found: Results) -> Any:
     return lines[lines["seconds of"] == summary.EACH].set_index("accuracy_mm")
 
 
-def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> None:
-    rows = [answer(LOW, "honest", 7, 1.3, 5e-8, repeat=1), *sweep()]
-    written = write(write_rows(tmp_path, rows)).read_text("utf-8")
+def test_the_sections_are_written_with_their_picture(tmp_path: Path) -> None:
+    found = results(tmp_path, [answer(LOW, "honest", 7, 1.3, 5e-8, repeat=1), *sweep()])
+    with style.applied():
+        sections = [summary.advice(found), accuracy.costs(found), accuracy.tolerances(found)]
+    text = written(tmp_path / "report.md", "", sections).read_text("utf-8")
     for title in ("Which solver to use", "The cost of accuracy", "Requested tolerance and achieved error"):
-        assert f"## {title}\n" in written
-    for picture in (tmp_path / "report").glob("*.png"):
-        assert imread(picture)[..., :3].std() > 0.04, f"{picture} is blank"
-    assert "nan" not in written.replace("-", " ").lower().split()
+        assert f"## {title}\n" in text
+    (picture,) = tmp_path.glob("*.png")
+    assert imread(picture)[..., :3].std() > 0.04, f"{picture} is blank"
+    assert "nan" not in text.replace("-", " ").lower().split()
 
 
 def panels(found: Results) -> Any:

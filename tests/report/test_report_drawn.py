@@ -113,6 +113,7 @@ def test_the_report_keeps_many_drawn_scenes_apart(tmp_path: Path, monkeypatch: p
     assert pd.read_csv(tmp_path / "report" / "drawn.csv")["n"].to_list() == [4386] * 4 + [6112]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_series_on_many_drawn_scenes_is_in_the_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,10 +10,11 @@ from synthetic_results import no_answer, results, row, table
 from harness.results import schema
 from problems import forms
 from report.analysis.time_to_solution import stage_seconds
+from report.figures import style
 from report.results.reader import Results
 from report.sections import summary
 from report.sections.time_to_solution import section as from_scene
-from report.writers.suite_report import write
+from report.writers.sections_writer import written
 
 LOW, HIGH = "4386/0107", "4386/1471"
 BUILD = {"condensation": 8.0, "ties": 0.5, "cholesky": 1.0, "condition": 100.0, "Q": 2.0}
@@ -83,6 +84,11 @@ def test_only_answers_within_the_limit_at_a_known_cost_have_a_total(tmp_path: Pa
     assert pd.isna(unknown.loc["newton (dual)", "total_1_s"])
 
 
+def test_a_run_without_an_answer_has_no_seconds_of_solving(tmp_path: Path) -> None:
+    found = lines(tmp_path, [sparse(), dense() | no_answer("time_limit")])
+    assert pd.isna(found.loc["newton (dual)", "solving_s"])
+
+
 def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
     section = from_scene(built(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
     assert len(section.blocks) == 1
@@ -91,11 +97,12 @@ def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path:
 
 def test_the_section_has_a_picture_and_a_table_of_all_stages(tmp_path: Path) -> None:
     rows = [r for s in (LOW, HIGH) for r in (sparse(s), dense(s), dense(s, "piqp", solve_s=6.1))]
-    section = from_scene(built(tmp_path, rows))
+    with style.applied():
+        section = from_scene(built(tmp_path, rows))
     assert [block.name for block in section.blocks] == ["roads", "roads"]
-    write(tmp_path)
-    assert (tmp_path / "report" / "roads.png").stat().st_size > 10_000
-    saved = pd.read_csv(tmp_path / "report" / "roads.csv")
+    written(tmp_path / "report.md", "", [section])
+    assert (tmp_path / "roads.png").stat().st_size > 10_000
+    saved = pd.read_csv(tmp_path / "roads.csv")
     assert {"model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery_s"} <= set(saved)
     assert saved["total_1_s"].min() == pytest.approx(0.9)
 

@@ -11,11 +11,11 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from report.document.blocks import Table, number, word
-from report.document.numbers import coordinate, extent, position, raised, significant, upwards
+from report.document.numbers import coordinate, extent, position, raised, rounded_up, significant, upwards
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.page.answer_page_data import headline
-from report.writers import sheet
+from report.writers import answer_report, sheet
 from report.writers.sheet import LETTERS, exactness, origin, write_sheet
 
 X, Y = np.linspace(0.0, 60.0, 7), np.linspace(0.0, 20.0, 3)
@@ -192,8 +192,9 @@ def test_no_bound_is_rounded_down_or_far() -> None:
         for digits in range(1, 5):
             for said in (upwards(bound, digits), significant(raised(bound, digits), digits)):
                 assert bound <= float(said) <= bound * (1 + 1.001 * 10.0 ** (1 - digits))
+        assert bound <= float(rounded_up(bound)) <= bound * 1.01001
     assert exactness(1.241e-3) == "The calculation is exact to 0.0013 mm for this model."
-    assert (raised(None), raised(np.inf)) == (None, None)
+    assert (raised(None), raised(np.inf), rounded_up(np.inf)) == (None, None, "inf")
 
 
 def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:
@@ -202,3 +203,17 @@ def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:
         closed = arrays | {"gap_after": np.full(42, rounding)}
         assert headline(record, closed)["text"].startswith("The largest gap left is 0 mm, at")
     assert "is 2.00 mm" in headline(record, arrays)["text"]
+
+
+def test_gaps_without_a_proven_error_are_told_without_a_figure() -> None:
+    record, arrays = answer(3)
+    check = {"allowed_mm": 0.1, "exceeded": None, "uncertainty_mm": None}
+    text = headline(record | {"allowed_gap": check}, arrays)["text"]
+    assert text.startswith("CANNOT BE TOLD: limit 0.1 mm, no error is proven; the largest gap")
+
+
+def test_contacts_without_known_forces_are_not_said_to_be_open() -> None:
+    record, arrays = answer(3)
+    contacts, _ = answer_report._fields(record | {"parts": []}, arrays | {"lam": np.full(42, np.nan)})
+    assert isinstance(contacts, Table)
+    assert "– of 21" in contacts.markdown

@@ -11,13 +11,21 @@ from urllib.parse import parse_qs
 import pandas as pd
 import pytest
 from matplotlib.image import imread
-from synthetic_results import everything, no_answer, results, row, sweep, write_rows
+from synthetic_results import everything, no_answer, results, row, sweep, table, write_rows
 
 from harness.results.schema import OWNERS
-from report.document.blocks import WIDEST, Figure, Section, Table, number
+from report.document.blocks import WIDEST, Figure, Section, Table, number, word
 from report.page.run_page_data import run_data
 from report.results.reader import read
-from report.sections import SECTIONS, accuracy, random_scenes, speed, summary, time_to_solution
+from report.sections import (
+    SECTIONS,
+    accuracy,
+    random_scenes,
+    series_throughput,
+    speed,
+    summary,
+    time_to_solution,
+)
 from report.writers.sections_writer import written
 from report.writers.suite_report import contents, write
 
@@ -161,6 +169,10 @@ def test_equal_titles_lead_to_a_heading_each() -> None:
     assert set(found) == resolved(page)
 
 
+def test_a_text_that_is_not_known_is_a_dash() -> None:
+    assert [word("title", "title").show({"title": text}) for text in ("", None, float("nan"))] == ["–"] * 3
+
+
 def test_further_columns_continue_below_with_the_first_repeated() -> None:
     data = pd.DataFrame({f"c{k}": [k] for k in range(12)})
     table = Table("", "", data, [number(f"c{k}", f"c{k}") for k in range(12)], keys=2)
@@ -176,3 +188,9 @@ def test_blocks_of_two_sections_have_no_file_in_common(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"same\.csv would be written by the sections 'One' and 'Two'"):
         written(tmp_path / "report.md", "Both", sections)
     assert not [*tmp_path.iterdir()]
+
+
+def test_a_series_without_an_answer_has_no_seconds_per_assembly(tmp_path: Path) -> None:
+    rows = [row(case=k, warm=k > 0, **no_answer("crashed")) for k in range(2)]
+    (line,) = table(series_throughput.section(results(tmp_path, rows))).data.to_dict("records")
+    assert pd.isna(line["once_s"])

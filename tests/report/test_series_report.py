@@ -10,8 +10,10 @@ import pytest
 from synthetic_series import CASES, M, made
 
 from harness.results import series_file
+from report.document.blocks import Figure
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
-from report.writers.series_report import _swept, write
+from report.writers import place_report
+from report.writers.series_report import _sheet, _swept, write
 from report.writers.sheet import Sheet
 
 
@@ -80,6 +82,7 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         (3e-13, 1e-12, True),
         (1e-9, 1e-12, False),
         (0.0, None, False),
+        (0.0, np.where(values > 0, 1e-12, np.nan), False),
     ):
         own = {"max_gap_mm": 0.04 + moved * values, "mean_gap_mm": 0.01, "gap_error_mm": error}
         cases = series.cases.assign(**own)
@@ -87,18 +90,30 @@ def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
         assert ("initial_gap.mean changes neither" in figure.caption) is said
 
 
+def test_one_unknown_error_leaves_the_exactness_untold(tmp_path: Path) -> None:
+    """Though all others are proven: an infinite error is null in the file, and NaN here."""
+    made(tmp_path)
+    series = read(tmp_path)
+    errors = np.full(len(series.cases), 1e-9)
+    for first, said in ((1e-9, "is exact to"), (np.nan, "could not be shown")):
+        errors[0] = first
+        cases = series.cases.assign(gap_error_mm=errors)
+        assert said in _sheet(replace(series, cases=cases), tmp_path, tmp_path).sure[0]
+
+
 @pytest.mark.usefixtures("without_pictures")
 def test_a_report_replaces_the_files_of_the_last_and_no_other(tmp_path: Path) -> None:
-    """Even if the title of the series looks like a link to one."""
+    """Even if the title of the series looks like a link to one. Without an answer it is a summary alone."""
     made(tmp_path, name="[CSV](mine.csv)")
     target = write(tmp_path).parent
     older = {path.name for path in target.iterdir()}
     assert {"quantile-maps.png", "worst-case.csv", "sheet.pdf"} < older
     (target / "mine.csv").write_text("x,y,gap\n")
-    series_file.write_contacts(tmp_path, {"m": np.array(M)})
     series_file.append(tmp_path, [({"case": k, "verdict": "no_answer"}, None) for k in range(CASES)])
-    write(tmp_path)
+    text = write(tmp_path).read_text()
     assert {path.name for path in target.iterdir()} == {"mine.csv", "report.md", "summary.csv"}
+    assert f"{CASES} no answer" in text
+    assert text.count("## ") == 1
 
 
 def test_the_sheet_has_no_map_of_an_earlier_verdict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,6 +130,17 @@ def test_the_sheet_has_no_map_of_an_earlier_verdict(tmp_path: Path, monkeypatch:
     assert [sheet.pictures[0].name for sheet in sheets] == ["worst-case.png", "allowed-gap.png"]
 
 
+def test_a_case_without_an_answer_has_the_largest_gaps_of_the_map_of_a_plan(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    gaps = made(tmp_path / "own")
+    record = {"share": 0.95, "own": [], "best": None, "samples": [], "limit_mm": None}
+    (figure,) = place_report._maps(record, tmp_path)
+    assert isinstance(figure, Figure)
+    assert figure.data is not None
+    all_cases = np.vstack([gaps, np.full(M, np.inf)])
+    np.testing.assert_allclose(figure.data["own_mm"], np.quantile(all_cases, 0.95, axis=0), rtol=1e-6)
+
+
 @pytest.mark.usefixtures("without_pictures")
 def test_a_series_without_nodes_has_no_map(tmp_path: Path) -> None:
     made(tmp_path)
@@ -122,11 +148,3 @@ def test_a_series_without_nodes_has_no_map(tmp_path: Path) -> None:
     text = write(tmp_path).read_text()
     assert "exceedance.png" in text
     assert "quantile-maps" not in text
-
-
-def test_a_series_without_an_answer_has_a_summary_alone(tmp_path: Path) -> None:
-    made(tmp_path)
-    series_file.append(tmp_path, [({"case": k, "verdict": "no_answer"}, None) for k in range(CASES)])
-    text = write(tmp_path).read_text()
-    assert f"{CASES} no answer" in text
-    assert text.count("## ") == 1

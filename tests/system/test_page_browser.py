@@ -11,8 +11,7 @@ import pandas as pd
 import pytest
 from commands import harness
 from hostile_texts import HOSTILE, results, solution
-from published_runs import DIRECTORIES, page_of
-from sample_size import ASKED
+from published_runs import SAMPLED, page_of
 from synthetic_results import SIZES, everything, row, write_rows
 from synthetic_results import results as results_of
 from synthetic_series import made as made_series
@@ -24,7 +23,7 @@ from report.results.series_results import read as read_series
 from report.writers.answer_report import write as write_solution
 from report.writers.series_report import write as write_series
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blank_pictures")]
 LOADS = itertools.count()
 SEEN = "[...document.querySelectorAll('#tables td[data-key]')]"
 NAMED = r"td.title.split('\n')[0].split(' on ')"  # label and scene
@@ -133,7 +132,7 @@ def test_no_view_has_an_error(chromium: Any, made: tuple[pd.DataFrame, Path], tm
             assert errors(chromium) == [], (page, view, shown[:200])
 
 
-@pytest.mark.parametrize("directory", DIRECTORIES[:: 1 if ASKED else 3], ids=lambda path: path.name)
+@pytest.mark.parametrize("directory", SAMPLED, ids=lambda path: path.name)
 def test_published_rows_have_the_judges_verdict(chromium: Any, directory: Path) -> None:
     opened(chromium, page_of(directory))
     count, other = chromium.execute_script(

@@ -46,8 +46,12 @@ def test_a_docstring_is_whole(name: str) -> None:
 
 @pytest.mark.parametrize("name", api.__all__)
 @pytest.mark.usefixtures("without_pictures")
-def test_its_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In an empty folder beside the examples."""
+def test_its_examples_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    """In an empty folder beside the examples; no report is written but by `report`."""
+    if name != "report":
+        request.getfixturevalue("without_report")
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     for test in doctest.DocTestFinder(recurse=False).find(

@@ -17,12 +17,12 @@ RECIPES = dict(re.findall(r"^### (An? .+?)\n(.*?)(?=^###? )", PAGE, re.MULTILINE
 FILE = re.compile(r"```\w+\n# ([\w/.-]+)(?:, (after|instead of) ([^\n]+))?\n(.*?)```", re.DOTALL)
 PLACES = [found for recipe in RECIPES.values() for found in FILE.findall(recipe)]
 CODE = sorted({name for name, *_ in PLACES if name.endswith(".py") and not name.startswith("tests/")})
-CACHES = (".mypy_cache", ".import_linter_cache")  # of `.ci/run`, where it has been run
+CACHES = (".mypy_cache", ".import_linter_cache")  # of `mypy` and `lint-imports`, where they were run
 FOLDERS = ("docs", "examples", "harness", "problems", "report", "rivetbench", "solvers", "studies", "tests")
 CHECKS = {
     "ruff": ["-m", "ruff", "check", "--no-cache"],
     "format": ["-m", "ruff", "format", "--check", "--no-cache"],
-    "mypy": ["-m", "mypy", "--follow-imports=silent", *CODE],
+    "mypy": ["-m", "mypy", *CODE],
     "layers": ["-c", "from importlinter.cli import lint_imports; raise SystemExit(lint_imports())"],
 }
 
@@ -51,12 +51,14 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
-#: Commands one after another, up to the first that fails, each forked from what has imported what most need.
+#: Commands one after another, up to the first that fails, each forked from what has imported what most need;
+#: pictures of few pixels, as in all tests.
 RUN = """
 import json, os, runpy, sys
 import _hypothesis_pytestplugin, bokeh.plotting, harness.api, harness.cli.app, harness.conformance.isolated
 import harness.scene.solve, hypothesis, matplotlib.pyplot, pytest, report.writers.answer_report
-import report.writers.suite_report, solvers.registry
+import report.figures.style, report.writers.suite_report, solvers.registry
+report.figures.style.DPI = 40
 for words in json.loads(sys.argv[1]):
     print("$", *words, flush=True)
     if (pid := os.fork()) == 0:

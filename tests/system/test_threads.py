@@ -113,7 +113,7 @@ def test_what_the_caller_owns_is_the_callers() -> None:
 
 @pytest.mark.parametrize("name", CALLS)
 def test_threads_get_the_bits_of_one(name: str) -> None:
-    (different, call), rounds = CALLS[name], -(-draws(16, 1000) // THREADS)
+    (different, call), rounds = CALLS[name], -(-draws(8, 1000) // THREADS)
     alone = [bits(call(k)) for k in range(different)]
     barrier = threading.Barrier(THREADS)
 
