@@ -110,7 +110,7 @@ def test_a_stiffness_that_nastran_calls_otherwise(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("labels", [True, False])
 def test_abaqus_text_with_labels_or_rows(labels: bool, tmp_path: Path) -> None:
-    """Nodes 7, 12 and 100 with the degrees of freedom 3 and 1 3; one entry of each pair, in either triangle."""
+    """Nodes 7, 12 and 100 with the degrees of freedom 3 and 1 3; of each pair one entry, in any triangle."""
     K = np.array([[4.0, 1.0, 0.0, -0.5], [1.0, 5.0, 0.25, 0.0], [0.0, 0.25, 6.0, 0.0], [-0.5, 0.0, 0.0, 7.0]])
     at = [(7, 3), (12, 1), (12, 3), (100, 3)]
     lines = ["** made by hand", "*MATRIX INPUT"]
