@@ -26,7 +26,7 @@ def bending(u: Any, v: Any, w: Any) -> Any:
 
 @cache
 def plate(length: float, south: float, north: float, side: float, poisson: float) -> tuple[Any, sp.csr_array]:
-    """Basis and K of rigidity one, two triangles per square of a side, mm. Products of curvatures have order 6."""
+    """Basis and K of rigidity one, two triangles per square of a side, mm. Products of κ are of order 6."""
     x, y = (
         np.linspace(*ends, round((ends[1] - ends[0]) / side) + 1) / UNIT
         for ends in ((0.0, length), (south, north))
