@@ -24,7 +24,7 @@ def contributors_of(series: Series) -> list[Block]:
     if missing := series.facts["cases"] - len(series.cases):
         without = out_of(missing, series.facts["cases"], "case")
         return [Text(f"**Contributors** and derivatives are left out: {without} without an answer.")]
-    gaps = series.cases["max_gap_mm"].to_numpy(), series.cases["gap_error_mm"].max()
+    gaps = series.cases["max_gap_mm"].to_numpy(), series.cases["gap_error_mm"].max(skipna=False)
     table = contributors.indices(series, *gaps)
     blocks: list[Block] = [Figure("contributors", OF_GAP, contributors.bars(table), table)]
     if series.nodes is not None:

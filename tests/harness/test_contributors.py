@@ -231,6 +231,13 @@ def test_a_gap_that_does_not_vary_has_no_contributors(tmp_path: Path) -> None:
     assert not found.drop(columns="input").to_numpy().any()
 
 
+def test_a_gap_that_is_not_proven_is_not_taken_for_constant(tmp_path: Path) -> None:
+    cases = drawn(read_scene(str(write_strip(tmp_path))), 2, "pressure.value=normal(1e-4, 1e-5)")
+    gaps = 0.1 + 1e-12 * np.arange(8) / 8
+    found = indices(series_of(cases, gaps), gaps, np.nan)
+    assert found["total_order"].all()
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
