@@ -161,6 +161,7 @@ class Measuring:
     def tasks(self, remaining: list[Measurement]) -> Iterator[tuple[Pending, Task] | None]:
         """One task after another; a scene is opened before its first task of a family of forms."""
         opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
+        keys: dict[str, str] = {}  # of its files, as they were opened
         made = set[str]()  # the forms whose matrices are made
         for batch in self.due(remaining):
             if batch is None:
@@ -173,12 +174,13 @@ class Measuring:
             if family not in opened:
                 with self.display.step(m.scene):
                     opened[family] = measurable(m.source, self.display, m.suite.reference_limit_s, m.form)
+                    keys[family] = opened[family].scene.key if opened[family].scene.sources else ""
             problem = opened[family]
             if m.form not in made:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task(batch, self.solvers[m.solver, m.entry.label], problem.scene.key)
+            task = Task(batch, self.solvers[m.solver, m.entry.label], keys[family])
             self.running[m.key] = m
             yield (task, problem), task
 
