@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 from itertools import product
+from math import lcm
 from typing import Any
 
 import numpy as np
@@ -17,16 +18,20 @@ def exactly(v: Vector) -> Exact:
 
 
 def solve_exactly(M: list[Exact], b: Exact) -> Exact:
-    """M x = b in rational numbers, M regular."""
-    rows = [[*row, value] for row, value in zip(M, b, strict=True)]
+    """M x = b, M regular, by whole numbers (E. H. Bareiss, Math. Comput. 22:565–578, 1968)."""
+    one = lcm(*(value.denominator for row in (*M, b) for value in row))
+    rows = [[int(value * one) for value in (*row, right)] for row, right in zip(M, b, strict=True)]
+    last = 1
     for j in range(len(rows)):
         pivot = next(i for i in range(j, len(rows)) if rows[i][j])
         rows[j], rows[pivot] = rows[pivot], rows[j]
+        top = rows[j]
         for i in range(len(rows)):
-            if i != j and rows[i][j]:
-                factor = rows[i][j] / rows[j][j]
-                rows[i] = [a - factor * c for a, c in zip(rows[i], rows[j], strict=True)]
-    return [row[-1] / row[j] for j, row in enumerate(rows)]
+            if i != j:
+                factor = rows[i][j]
+                rows[i] = [(top[j] * a - factor * c) // last for a, c in zip(rows[i], top, strict=True)]
+        last = top[j]
+    return [Fraction(row[-1], row[j]) for j, row in enumerate(rows)]
 
 
 def exact_solution(assembly: Assembly, load: LoadCase, active: Mask) -> tuple[Exact, Exact, Exact]:

@@ -4,6 +4,7 @@ min ½λᵀQλ − pᵀλ, λ ≥ 0 is min ‖Uλ − U⁻ᵀp‖, λ ≥ 0 with
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import scipy.linalg as sla
@@ -13,7 +14,7 @@ import scipy.sparse as sp
 from harness.conformance.known_problems import contact_rows, stiffness
 from problems.forms import Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
-from problems.forms.prepared import Prepared
+from problems.forms.prepared import Prepared, dual_alone
 from problems.forms.problem import Problem, in_form
 from problems.stiffness.operator import Stiffness
 
@@ -33,11 +34,20 @@ def problem_in(prepared: Prepared, form: Form) -> Problem:
     return in_form(prepared, form)
 
 
+@cache
 def make_strips(elements: int) -> Prepared:
     """Two strings under tension on elastic beds (N/mm), a contact at each node: condition number ≈ 1e3."""
     main, side = np.full(elements, 2e3 + 2.0), np.full(elements - 1, -1e3)
     K = np.diag(main) + np.diag(side, 1) + np.diag(side, -1)
     return Prepared(Assembly(Stiffness.of(K, 0.5 * K), contact_rows(elements, 0)))
+
+
+@cache
+def make_beam(size: int) -> Prepared:
+    """A beam on a soft bed with a contact at each unknown: Q decays along it, and edges of contact creep."""
+    D = np.diff(np.eye(size), 2, axis=0)
+    Q = np.linalg.inv(1e4 * D.T @ D + 1e-2 * np.eye(size))
+    return dual_alone(np.asfortranarray((Q + Q.T) / 2))
 
 
 def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, DualLoadCase]:

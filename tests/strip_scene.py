@@ -31,12 +31,16 @@ I = 2e3
 """
 
 
-def write_strip(folder: Path, *pairs: tuple[str, str]) -> Path:
-    """strip.toml in `folder`, some of its text replaced."""
-    text = STRIP
+def strip_with(*pairs: tuple[str, str], text: str = STRIP) -> str:
+    """The text of the strip, some of it replaced."""
     for old, new in pairs:
         assert text.count(old) == 1
         text = text.replace(old, new)
+    return text
+
+
+def write_strip(folder: Path, *pairs: tuple[str, str]) -> Path:
+    """strip.toml in `folder`, some of its text replaced."""
     path = folder / "strip.toml"
-    path.write_text(text)
+    path.write_text(strip_with(*pairs))
     return path

@@ -77,6 +77,12 @@ def with_bay(folder: Path) -> list[Tables]:
     return [write_part(folder, name, 40 * np.eye(len(nodes)), nodes) for name in "ab"]
 
 
+def write_plates(folder: Path, joint: Joint, **more: Any) -> list[Tables]:
+    """The tables of the two parts of the built-in joint, as superelements. more : see `write_part`."""
+    both = zip("ab", stiffnesses(joint), strict=True)
+    return [write_part(folder, name, K, flat(joint.nodes), **more) for name, K in both]
+
+
 def scene_from(parts: list[Tables], *effects: Tables, **joint: Any) -> JointScene:
     scene = scene_of({"joint": {"part": parts} | joint, "effect": list(effects)})
     assert isinstance(scene, JointScene)

@@ -74,11 +74,11 @@ class MovableFasteners:
         else:
             table = read_columns(Path(holes), ("x", "y"), options)
             points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.words["name"]
+        points = points.round(DIGITS)  # as plans have them: rounding may leave the parts
         faults = faults + self.faults(points, holes)
         if faults:
             raise InputError(faults)
-        places = map(tuple, points.round(DIGITS).tolist())
-        return plan_of(points), dict(zip(places, labels, strict=False))
+        return plan_of(points), dict(zip(map(tuple, points.tolist()), labels, strict=False))
 
     def faults(self, points: Matrix, source: str) -> list[Fault]:
         """One fault for each point off the parts, there twice, or where a fastener stays installed."""

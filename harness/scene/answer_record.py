@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from harness.results.provenance import fingerprints, resident_mib, stamp
+from harness.results.provenance import resident_mib, stamp
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, Vector
@@ -64,7 +64,9 @@ def bound_shown(solution: Solution) -> float:
 
 
 def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[str, Any]:
-    """The record DIR/solution.json. built : the stages that the cache did not hold. solver : asked for."""
+    """The record DIR/solution.json, but for its inputs. built : the stages that the cache did not hold.
+    solver : asked for.
+    """
     problem, judgement = solution.problem, solution.judgement
     scene, data, reference = solution.scene, problem.prepared, problem.reference
     return {
@@ -76,7 +78,6 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         "scene": scene.name,
         "title": scene.title,
         "scene_key": scene.key,
-        "inputs": fingerprints(scene.sources),
         "form": problem.form,
         "n": data.assembly.junction_size,
         "unknowns": data.assembly.n,

@@ -225,7 +225,7 @@ def solve(
 
     history = []
     for name, part, approaches, (answer, before_mm) in through(scene, of_stage):
-        unproven = 0.0 if before_mm <= LIMIT_MM else inf
+        proven, judgement = before_mm <= LIMIT_MM, answer.judgement
         history.append(
             StageAnswer(
                 name=name,
@@ -233,12 +233,12 @@ def solve(
                 x=answer.x,
                 lam=answer.lam,
                 gap=answer.gap,
-                judgement=answer.judgement,
+                judgement=judgement if proven else replace(judgement, verdict="cannot_be_judged"),
                 error_bound_mm=answer.error_bound_mm,
-                gap_error_mm=answer.gap_error_mm + unproven,
+                gap_error_mm=answer.gap_error_mm + (0.0 if proven else inf),
             )
         )
-    return replace(answer, scene=scene, stages=tuple(history))
+    return replace(answer, scene=scene, judgement=history[-1].judgement, stages=tuple(history))
 
 
 class _Clock:

@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from harness.results.atomic_output import RECORD, atomic_output, refuse_inputs, refuse_unwritable
+from harness.results.provenance import fingerprints
 from harness.results.records import refuse_other_command, replace_text, to_line
 from harness.terminal import DONE, FAILED
 from harness.terminal.console import ConsoleReporter, show_verdict, table_of
@@ -66,11 +67,12 @@ def solve_into(
         allowed = "left out: the mesh of superelements and of given matrices is not known here"
         raise InputError.one("--refine", "scene", scene.name, allowed)
     print_unusual(scene, console)
+    files = fingerprints(scene.sources)  # now: they may change meanwhile
     reporter = ConsoleReporter(console)
     solution = solve(
         scene, solver, form=form, tolerance=tolerance, limit_s=reference_limit_s, reporter=reporter
     )
-    record, arrays = recorded(solution, reporter.stages, solver), arrays_of(solution)
+    record, arrays = recorded(solution, reporter.stages, solver) | {"inputs": files}, arrays_of(solution)
     for text, style in summary(record):
         console.print(text, style=style)
     begun = time.perf_counter()

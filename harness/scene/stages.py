@@ -26,7 +26,7 @@ class StageAnswer:
     gap : array (m,), mm
         Remaining gaps.
     judgement : Judgement
-        The judge's figures.
+        The judge's figures; `cannot_be_judged` where `gap_error_mm` is infinite as below.
     error_bound_mm : float
         Proven bound on max|x − x*|, mm, for the exact answer x* at the approaches that are locked.
     gap_error_mm : array (m,), mm

@@ -53,11 +53,16 @@ def results_of(
 def on_workers(
     job: Job, remaining: list[int], executor: Executor, count: int, console: Console
 ) -> Iterator[list[Result]]:
-    """Blocks of cases, small enough that the workers end together. What fails is left for another run."""
+    """Blocks of cases, small enough that the workers end together. What fails is left for another run.
+
+    Raises InputError if a task does: another run would meet the same.
+    """
     size = min(max(len(remaining) // (4 * count), 1), BLOCK)
     blocks = [remaining[start : start + size] for start in range(0, len(remaining), size)]
     tasks = ((block, (replace(job, cases=job.cases.only(block)), block)) for block in blocks)
     for block, outcome in done_as_completed(executor, count, solve_on_worker, tasks):
+        if isinstance(outcome, InputError):
+            raise outcome
         if isinstance(outcome, BaseException):
             why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
             console.print(f"cases {block[0]} … {block[-1]} not solved, run again: {why}", style="red")

@@ -183,7 +183,8 @@ class StagedSession:
         row, gap = stages[-1][1]
         gaps = {"stages_max_gap_mm": {name: result.row.get("max_gap_mm") for name, result in stages}}
         if unproven and gap is not None:
-            row = row | {"gap_error_mm": np.inf, "bound_mm": np.inf, "verdict": "cannot_be_judged"}
+            errors = [name for name in ("gap_error_mm", "force_error_N", "bound_mm") if name in row]
+            row = row | dict.fromkeys(errors, np.inf) | {"verdict": "cannot_be_judged"}
             row = row | {"message": f"fasteners lock what is not proven to {LIMIT_MM:g} mm"}
         failed = next(((name, one.row) for name, one in stages if one.row["verdict"] != "within"), None)
         if failed is None:

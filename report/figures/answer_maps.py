@@ -105,8 +105,9 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
     force.set_xticks(range(len(table)), [textwrap.fill(name, 14) for name in table["stage"]])
     force.legend()
     for axes in stress:
-        axes.plot(table["stage"], table[STRESS], color=style.BLACK, marker="o")
-        axes.set(ylabel=f"largest {STRESS}", ylim=(0.0, 1.1 * table[STRESS].max() or None))
+        largest = table[STRESS].astype(float)  # NaN where none is known
+        axes.plot(table["stage"], largest, color=style.BLACK, marker="o")
+        axes.set(ylabel=f"largest {STRESS}", ylim=(0.0, 1.1 * largest.max() if largest.max() > 0 else None))
     scale = rooted("gap, mm", "viridis", arrays["stage_gaps"])
     maps = []
     told = zip(table.to_dict("records"), record["stages"], arrays["stage_gaps"], strict=True)

@@ -24,7 +24,7 @@ ENDS, RESAMPLES = (0.025, 0.975), 999
 
 
 def indices(series: Series, y: Array, error: float) -> pd.DataFrame:
-    """A row per input, of y (cases,), which is known up to an error."""
+    """A row per input, of y (cases,), which is known up to an error; NaN if one case has none."""
     f, random = _answers(series, y[:, None], error)[:, 0], np.random.default_rng(0)
     N, table = f.shape[-1], pd.DataFrame({"input": series.facts["random_inputs"]})
     picked = np.vstack([np.arange(N), random.integers(N, size=(RESAMPLES, N))])
@@ -40,7 +40,7 @@ def of_contacts(series: Series) -> Array:
     """(2, d, m): both indices of each of d inputs for the gap at each contact; 0 where it does not vary, NaN
     where a few cases make its variance v, so that v's own standard error is more than v / 3.
     """
-    error, pieces = series.cases["gap_error_mm"].max(), []
+    error, pieces = series.cases["gap_error_mm"].max(skipna=False), []
     for gaps in series.of_contacts():
         f = _answers(series, gaps, error)
         squares = (f - f.mean(axis=(0, 2), keepdims=True)) ** 2
@@ -52,7 +52,7 @@ def of_contacts(series: Series) -> Array:
 
 def of_forces(series: Series) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The rows of the largest force, and these with those of each fastener."""
-    error, places = series.cases["force_error_N"].max(), series.facts["fasteners"]
+    error, places = series.cases["force_error_N"].max(skipna=False), series.facts["fasteners"]
     largest = indices(series, abs(series.forces).max(axis=1), error)
     pairs = zip(places, series.forces.T, strict=True)
     each = [indices(series, y, error).assign(**{k: at[k] for k in ("kind", "x", "y")}) for at, y in pairs]
@@ -68,8 +68,10 @@ def _estimated(f: Array) -> Array:
 
 
 def _answers(series: Series, y: Array, error: float) -> Array:
-    """(d + 2, s, N) of y (cases, s): at A, B, and A with one column of B each; 0 where y is constant."""
-    varies = np.ptp(y, axis=0) > 2 * error
+    """(d + 2, s, N) of y (cases, s): at A, B, and A with one column of B each; 0 where y is known to be
+    constant.
+    """
+    varies = ~(np.ptp(y, axis=0) <= 2 * error)  # to what is known: with no error nothing is constant
     return (y * varies).reshape(-1, series.facts["cases_per_point"], y.shape[1]).transpose(1, 2, 0)
 
 

@@ -144,10 +144,10 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
             numbers = record["samples"][-1]["numbers"]
             count = len(numbers)
             series = replace(series, cases=series.cases[series.cases["case"].isin(numbers)])
-        of_answered = share * (count - 1) / max(len(series.cases) - 1, 1)  # without an answer: the largest
-        if series.nodes is None or not len(series.cases) or of_answered > 1:
+        place, last = share * (count - 1), len(series.cases) - 1  # those without an answer have the largest
+        if series.nodes is None or place > last:
             return [Text("No picture: some cases have no answer.")]
-        pieces = [np.quantile(some, of_answered, axis=0) for some in series.of_contacts()]
+        pieces = [np.quantile(some, place / max(last, 1), axis=0) for some in series.of_contacts()]
         shown.append((text, series.nodes, np.concatenate(pieces), series.marks))
     scale = rooted("gap, mm", "viridis", *(values for _, _, values, _ in shown))
     limit = np.inf if record["limit_mm"] is None else record["limit_mm"]

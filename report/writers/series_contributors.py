@@ -18,25 +18,18 @@ SLOPES = (
 
 
 def contributors_of(series: Series) -> list[Block]:
-    """The blocks of a series for contributors, or why there are none: all cases need proven answers."""
+    """The blocks of a series for contributors, or why there are none: they need the answers to all cases."""
     if series.facts.get("cases_per_point", 1) == 1:
         return []
-    unknown = {"an answer": series.facts["cases"] - len(series.cases)}
-    unknown["a proven error"] = int(series.cases["gap_error_mm"].isna().sum())
-    for what, count in unknown.items():
-        if count:
-            without = out_of(count, series.facts["cases"], "case")
-            return [Text(f"**Contributors** and derivatives are left out: {without} without {what}.")]
-    gaps = series.cases["max_gap_mm"].to_numpy(), series.cases["gap_error_mm"].max()
+    if missing := series.facts["cases"] - len(series.cases):
+        without = out_of(missing, series.facts["cases"], "case")
+        return [Text(f"**Contributors** and derivatives are left out: {without} without an answer.")]
+    gaps = series.cases["max_gap_mm"].to_numpy(), series.cases["gap_error_mm"].max(skipna=False)
     table = contributors.indices(series, *gaps)
     blocks: list[Block] = [Figure("contributors", OF_GAP, contributors.bars(table), table)]
     if series.nodes is not None:
         blocks.append(Figure("contributors-map", OF_CONTACTS, *contributors.maps(series, series.nodes)))
-    unproven = int(series.cases["force_error_N"].isna().sum()) if series.forces.size else 0
-    if unproven:
-        without = out_of(unproven, series.facts["cases"], "case")
-        blocks.append(Text(f"**Contributors** of forces are left out: {without} without a proven error."))
-    elif series.forces.size:
+    if series.forces.size:
         largest, each = contributors.of_forces(series)
         blocks.append(Figure("contributors-force", OF_FORCE, contributors.bars(largest), each))
     columns = [word("input", "input"), number("mean", "mean"), number("mm per unit", "derivative")]

@@ -658,6 +658,12 @@ def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
         MovableFasteners.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
 
 
+def test_holes_are_checked_where_plans_have_them(strip: Path, tmp_path: Path) -> None:
+    (tmp_path / "holes.csv").write_text("x,y\n200.0000004,10\n10,10\n")
+    movable = MovableFasteners.of(read_scene(str(strip)))
+    assert movable.candidates(str(tmp_path / "holes.csv"))[0] == ((10.0, 10.0), (200.0, 10.0))
+
+
 class ReachedError(Exception):
     """A search begins."""
 

@@ -174,6 +174,7 @@ def test_what_searches_cannot_draw_is_refused(scene: Path, tmp_path: Path) -> No
     shims = "shim", scene, "--allow-gap", 0.1, "--stock", 0.1
     for words, said in (
         (("place", scene, "--count", 1), "the fasteners change places"),
+        (("place", scene, "--count", 1, "--random", " fasteners.preload=norm(9, 1)"), "the fasteners change"),
         ((*shims, "--allow-stress", 100), "loads are those of the scene"),
     ):
         done = harness(*words, "--out", tmp_path / "out")

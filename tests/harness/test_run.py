@@ -24,6 +24,7 @@ from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite, read_written
 from harness.results import records
 from harness.results.records import Row
+from harness.verification.reference_problem import ReferenceProblem, measurable
 from problems.errors import InputError
 from studies.smaller_results import pack
 
@@ -288,6 +289,23 @@ def test_an_answer_that_cannot_be_saved_ends_the_run(
     assert done.exit_code == 2
     assert "no space left; rows already written are safe" in done.stderr
     assert not (tmp_path / "out" / records.MEASUREMENTS).exists()
+
+
+def test_a_scene_whose_file_changes_when_it_has_been_opened_ends_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The reference is that of the old one, on which right answers to the new one would be wrong."""
+    suite = tiny_joint.write_suite(tmp_path / "own")
+
+    def changing(*of: Any) -> ReferenceProblem:
+        problem = measurable(*of)
+        tiny_joint.write_problem(tmp_path / "own" / "tiny.npz", shift=1.0)
+        return problem
+
+    monkeypatch.setattr("harness.measurement.suite_run.measurable", changing)
+    done = harness("run", suite, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "it has changed since" in done.stderr
 
 
 def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path) -> None:

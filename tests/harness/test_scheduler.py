@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from io import StringIO
@@ -38,7 +38,7 @@ from harness.measurement.suite_run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
 from harness.results.comparison import Incomparable
-from harness.series.executors import solve_on_worker
+from harness.series.executors import on_workers, solve_on_worker
 from harness.series.run import run
 from harness.series.session import Job
 from problems.errors import Fault, InputError
@@ -137,6 +137,12 @@ def test_a_worker_with_other_matrices_is_refused(tmp_path: Path) -> None:
     np.savez(path, **arrays | {"K": 2 * arrays["K"]})
     with pytest.raises(InputError, match="or are others on this worker"):
         solve_on_worker((replace(job, key="another"), [0]))
+
+
+def test_wrong_input_ends_a_series_on_workers_as_in_one_process(job: Job) -> None:
+    wrong = replace(job, scene_key="another")
+    with ThreadPoolExecutor(1) as executor, pytest.raises(InputError, match="or are others on this worker"):
+        list(on_workers(wrong, [0], executor, 1, QUIET))
 
 
 def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

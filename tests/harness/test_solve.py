@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from small_problems import solve_by_nnls
 from suite_runs import said_by
 
 from harness.results.records import read_arrays
+from harness.scene.solution import Solution, solve
 from harness.scene.solve import solve_into
 from problems.build import load_case, model_of, prepared
 from problems.scene_files import read_scene
@@ -281,6 +283,22 @@ def test_nothing_of_an_older_answer_remains_and_what_is_not_ours_does(tmp_path: 
     assert (out / "mine.txt").read_text() == "kept"
     files = json.loads((out / "solution.json").read_text())["files"]
     assert sorted([*files, "mine.txt"]) == sorted(path.name for path in out.iterdir())
+
+
+def test_hashes_of_inputs_are_of_the_files_as_they_were_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (scene := tmp_path / "scene.toml").write_text(APART)
+    read = sha256(scene.read_bytes()).hexdigest()
+
+    def edited_meanwhile(*arguments: Any, **options: Any) -> Solution:
+        scene.write_text("# for the next answer")
+        return solve(*arguments, **options)
+
+    monkeypatch.setattr("harness.scene.solve.solve", edited_meanwhile)
+    said_by(partial(solve_into, str(scene), None, 1e-9, tmp_path / "out"))
+    record = json.loads((tmp_path / "out" / "solution.json").read_text())
+    assert record["inputs"] == {"scene.toml": read}
 
 
 def test_a_full_disk_leaves_the_older_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,7 @@ from harness.verification.reference import reference_of
 from harness.verification.reference_problem import last_stage, open_problem
 from problems.forms import Form
 from problems.model.joint import Joint
-from problems.model.scene import JointScene
+from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
 from report.page.answer_page_data import stage_lines
 from report.writers import sheet
@@ -107,6 +107,22 @@ def test_an_answer_to_unproven_approaches_is_not_proven(
     proven = open_problem(read_scene(str(staged))).reference
     assert proven.bound_mm <= 1e-9
     assert solve(str(staged)).gap_error_mm.max() <= 1e-7
+
+
+def test_no_verdict_rests_on_unproven_approaches(
+    staged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the answer to the last stage is proven, at the approaches that were locked."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+
+    def known_after_the_release(scene: Scene, *arguments: Any) -> Reference:
+        found = reference_of(scene, *arguments)
+        return found if scene.title.endswith("release") else replace(found, bound_mm=1e-3)
+
+    monkeypatch.setattr(reference_problem, "reference_of", known_after_the_release)
+    answer = solve(str(staged))
+    assert answer.error_bound_mm <= 1e-9
+    assert answer.judgement.verdict == "cannot_be_judged"
 
 
 def test_what_is_measured_is_the_last_stage(staged: Path, tmp_path: Path) -> None:

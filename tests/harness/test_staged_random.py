@@ -16,6 +16,7 @@ from harness.placement.candidates import MovableFasteners
 from harness.placement.session import FastenerStudy, PlanSession, Question
 from harness.results import series_file
 from harness.scene.solution import solve
+from harness.series import staged
 from harness.series.executors import solve_on_worker
 from harness.series.load_case_source import GapCases
 from harness.series.session import Job, Result, SeriesOptions
@@ -114,6 +115,14 @@ def test_spring_back_of_a_linear_joint() -> None:
         gaps = row["stages_max_gap_mm"]
         assert gaps["rivet"] < gaps["tack"] - 0.1 * preload * c / (1 + STIFFNESS * c)
     assert len({row["max_gap_mm"] for row, _ in results.values()}) == 2
+
+
+def test_forces_after_what_is_locked_unproven_are_not_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(staged, "LIMIT_MM", 0.0)
+    results = results_of(job_of(scene_at(scene_file(tmp_path)), LAWS))
+    assert [result.row["force_error_N"] for result in results.values()] == [np.inf, np.inf]
 
 
 def test_without_scatter_it_is_the_plain_series(tmp_path: Path) -> None:

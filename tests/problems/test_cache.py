@@ -118,10 +118,10 @@ def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> N
         assert not array.flags.writeable
 
 
-def with_more(text: str, edited: Path) -> Callable[[Path], bytes]:
-    """Path.read_bytes, as if that text stood at the end of one file."""
+def with_more(edited: Path) -> Callable[[Path], bytes]:
+    """Path.read_bytes, as if a line of code stood at the end of one file."""
     read = Path.read_bytes
-    return lambda path: read(path) + text.encode() if path == edited else read(path)
+    return lambda path: read(path) + b"\nMORE = 1\n" if path == edited else read(path)
 
 
 OWN = "input.user_matrices"  # makes a user's matrices, no joint's
@@ -142,11 +142,7 @@ def test_a_change_of_the_code_that_builds_changes_the_key(
     edited = (ROOT / "problems" / module.replace(".", "/")).with_suffix(".py")
     key = build.prepared(scene).key
     monkeypatch.setattr(storage, "_read", storage._read.__wrapped__)
-    monkeypatch.setattr(Path, "read_bytes", with_more("\n# words\n", edited))
-    assert build.prepared(scene).key == key
-    monkeypatch.undo()
-    monkeypatch.setattr(storage, "_read", storage._read.__wrapped__)
-    monkeypatch.setattr(Path, "read_bytes", with_more("\nMORE = 1\n", edited))
+    monkeypatch.setattr(Path, "read_bytes", with_more(edited))
     assert build.prepared(scene).key != key
 
 

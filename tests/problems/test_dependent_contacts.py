@@ -51,13 +51,13 @@ def column_of(A: sp.csc_array) -> int | None:
     return None
 
 
-@pytest.mark.parametrize("A", [differences(10_000), pairs(30_000), grid(70), sp.csc_array((3, 0))])
+@pytest.mark.parametrize("A", [differences(10_000), pairs(3_000), grid(70), sp.csc_array((3, 0))])
 def test_independent_contacts_are_taken(A: sp.csc_array) -> None:
     assert column_of(A) is None
 
 
 @pytest.mark.parametrize(
-    ("A", "factor"), [(differences(10_000), 1.0), (pairs(30_000), -3.0), (grid(70), 1e-40)]
+    ("A", "factor"), [(differences(10_000), 1.0), (pairs(3_000), -3.0), (grid(70), 1e-40)]
 )
 def test_a_contact_that_is_there_twice_is_named(A: sp.csc_array, factor: float) -> None:
     twice = sp.csc_array(sp.hstack([A, factor * A[:, [17]]]))

@@ -40,7 +40,7 @@ CORNERS = [(0.0, 0.0), (400.0, 0.0), (0.0, 120.0), (400.0, 120.0)]
 
 
 @given(st.lists(POINT, min_size=1, max_size=6))
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 def test_a_fastener_acts_where_it_is(points: list[tuple[float, float]]) -> None:
     f = Fasteners(kind="fasteners", preload=700.0, points=tuple(points)).force(JOINT)
     on_a, on_b = f[:45], f[45:]

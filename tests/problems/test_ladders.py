@@ -105,8 +105,8 @@ def test_the_refined_reference_finds_the_exact_answer(name: str) -> None:
     assert np.isfinite(found.bound_mm) or base.prepared.facts["cond_K"] > 2e13  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("name", TAKEN)
-def test_every_rung_can_be_judged(name: str) -> None:
+@pytest.mark.parametrize("name", sorted({*TAKEN} - {*EXACT}))
+def test_a_rung_without_an_exact_answer_can_be_judged(name: str) -> None:
     base = opened(name)
     assert base.reference.bound_mm <= 0.1 * base.limit_mm(1e-7)
 
@@ -167,15 +167,12 @@ def test_all_contacts_of_a_vertex_touch_and_a_third_have_a_force(n: int) -> None
 # --- at full size ---------------------------------------------------------------------------------------
 
 FULL = rung_names("hard-full/")
-OF_BOTH_SIZES = ["degeneracy", "duplicates", "supports", "thickness"]
 N = 300  # unknowns per part: 256 + 32 + 8 + 4
 SMALL = {
-    **{
-        f"{percent} % weak": two_parts(N, 1e6, seed=2, closed=min(0.4, 1 - percent / 100), weak=percent / 100)
-        for percent in (25, 50, 75, 100)
-    },
-    **{f"cond {cond:g}": two_parts(N, cond, seed=2) for cond in (1e10, 1e12)},
-    **{f"2^-{bits} apart": two_parts(N, 1e4, seed=3, A=contacts(N, 128, 2.0**-bits)) for bits in (4, 12, 16)},
+    "25 % weak": two_parts(N, 1e6, seed=2, closed=0.4, weak=0.25),
+    "100 % weak": two_parts(N, 1e6, seed=2, closed=0.0, weak=1.0),
+    "cond 1e12": two_parts(N, 1e12, seed=2),
+    "2^-16 apart": two_parts(N, 1e4, seed=3, A=contacts(N, 128, 2.0**-16)),
 }
 
 

@@ -133,7 +133,6 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "objects": ({"f": np.array([None] * 8)}, "Object arrays"),
     "missing g": ({"g": None}, "g = None: is missing"),
     "a contact of nothing": (changed("A", (slice(None), 2), 0.0), "A[:, 2]"),
-    "a contact twice": ({"A": DATA["A"][:, [0, 1, 2, 1]]}, "A[:, 3]"),
 }
 
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from effect_tables import TABLES, scene_of
+from effect_tables import JOINT, TABLES, scene_of
 from small_joints import make_scene, untied
 
 from problems.build import prepared
@@ -17,15 +17,18 @@ from problems.scene_files import read_scene, scene_names
 
 ROOT = Path(__file__).parents[2]
 
-#: Each scene by a process of its own, forked from one that has imported no effect.
+#: A scene without effects, then each other one by a process of its own, forked from that which built it.
 RUN = """
 import os, sys, numpy as np
 import problems
 assert problems.__path__ == [os.path.join(os.getcwd(), "problems")]
 from problems.build import load_case, prepared
 from problems.scene_files import read_scene
+joint_alone, *scene_files = sys.argv[1:]
+scene = read_scene(joint_alone)
+prepared(scene).Q, load_case(scene)
 assert not any(m.startswith("problems.effects.") for m in sys.modules)
-for scene_file in sys.argv[1:]:
+for scene_file in scene_files:
     if os.fork():
         assert os.wait()[1] == 0
         continue
@@ -40,7 +43,7 @@ for scene_file in sys.argv[1:]:
 
 
 def imported(scenes: list[Path], cache: Path, package: Path = ROOT) -> list[set[str]]:
-    """The modules of `problems` in the folder `package` that building each scene, into .npz, imports."""
+    """The modules of `problems` in the folder `package` that each scene but the first needs, into .npz."""
     done = subprocess.run(
         [sys.executable, "-c", RUN, *map(str, scenes)],
         cwd=package,
@@ -60,8 +63,9 @@ def test_a_named_effect_imports_itself_alone_and_needs_no_other_file(tmp_path: P
     """Each kind, and some together: their bits are the same from a copy without the other effects' files."""
     some = ["installed_fasteners", "ribs", "rigid_tool", "self_weight", "shims"]
     wanted = [[kind] for kind in sorted(set(TABLES) - {"support_shift"})] + [some]
-    scenes = [scene_of(tmp_path, *kinds) for kinds in wanted]
-    found = imported(scenes, tmp_path / "all")
+    joint_alone, scenes = tmp_path / "joint.toml", [scene_of(tmp_path, *kinds) for kinds in wanted]
+    joint_alone.write_text(JOINT)
+    found = imported([joint_alone, *scenes], tmp_path / "all")
     effects = [[m for m in sorted(modules) if m.startswith("problems.effects.")] for modules in found]
     assert effects == [[f"problems.effects.{kind}" for kind in kinds] for kinds in wanted]
     shutil.copytree(ROOT / "problems", tmp_path / "problems", ignore=shutil.ignore_patterns("__pycache__"))
@@ -69,7 +73,7 @@ def test_a_named_effect_imports_itself_alone_and_needs_no_other_file(tmp_path: P
         (tmp_path / "problems" / "effects" / f"{kind}.py").unlink()
     arrays = scenes[-1].with_suffix(".toml.npz")
     bits = arrays.read_bytes()
-    (bare,) = imported(scenes[-1:], tmp_path / "bare", tmp_path)
+    (bare,) = imported([joint_alone, scenes[-1]], tmp_path / "bare", tmp_path)
     assert bare == found[-1]
     assert arrays.read_bytes() == bits
 

@@ -27,7 +27,7 @@ from problems.scene_files import read_scene, scene_of
 from solvers.registry import make_solver
 
 EFFECTS = Path(__file__).parents[2] / "docs" / "effects.md"
-NAMES = ["gallery/three-part-stack", "docs/effects.md", *(["gallery/measured-gap"] if ASKED else [])]
+NAMES = ["docs/effects.md", *(["gallery/three-part-stack", "gallery/measured-gap"] if ASKED else [])]
 ELEMENT = 28.0  # mm, the side of a triangle; the scenes have a node every 15 mm
 
 

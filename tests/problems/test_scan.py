@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import RectBivariateSpline
 from small_joints import JOINT, make_scene
-from superelements import flat, scene_from, stiffnesses, write_part
+from superelements import scene_from, write_plates
 
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
 from problems.load_cases.gaps_through_scan import NOISE, Scan, square_root
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
 
-SD, LENGTH, COUNT = 0.2, 120.0, 4000
+SD, LENGTH, COUNT = 0.2, 120.0, 2000
 SCAN = np.array([[0.0, 0.0, 0.5], [130.0, 41.0, 0.9], [133.0, 44.0, 0.95], [400.0, 120.0, 0.3]])
 
 
@@ -49,11 +49,7 @@ def test_every_case_passes_through_the_scan(tmp_path: Path) -> None:
 
 def test_on_superelements_too(tmp_path: Path) -> None:
     """At contacts that are not on the grid of the field, by the splines that interpolate it."""
-    parts = [
-        write_part(tmp_path, name, K, flat(JOINT.nodes))
-        for name, K in zip("ab", stiffnesses(JOINT), strict=True)
-    ]
-    scene = scene_from(parts)
+    scene = scene_from(write_plates(tmp_path, JOINT))
     at = scene.joint.places(("a", "b"))[[3, 20, 22, 44]]
     length = 130.0
     assert abs(at[1, 0] - scene.joint.grid(length)[0]).min() > 1
@@ -84,11 +80,7 @@ def test_a_scan_is_made_once_whatever_is_sent_to_workers(
 
 def test_no_matrix_has_all_points_and_the_whole_grid(tmp_path: Path) -> None:
     """A fine grid on superelements, where 100 x 145 x 481 numbers would take 53 MiB."""
-    parts = [
-        write_part(tmp_path, name, K, flat(JOINT.nodes))
-        for name, K in zip("ab", stiffnesses(JOINT), strict=True)
-    ]
-    joint, random = scene_from(parts).joint, np.random.default_rng(2)
+    joint, random = scene_from(write_plates(tmp_path, JOINT)).joint, np.random.default_rng(2)
     points = np.column_stack([random.uniform((0, 0), (400, 120), (100, 2)), random.standard_normal(100)])
     assert [len(lines) for lines in joint.grid(5.0)] == [481, 145]
     tracemalloc.start()

@@ -133,7 +133,8 @@ def test_without_coordinates_windows_go_along_the_bands(kind: str) -> None:
     found = Prepared(Assembly(Stiffness.of(*bodies), sp.csc_array(A))).approximate_inverse
     assert (found.M is None) == (kind == "general")
     if found.M is not None:
-        Q = A.T @ np.linalg.solve(sp.block_diag(bodies).toarray(), A.toarray())
+        sides = zip(bodies, np.split(A.toarray(), 2), strict=True)
+        Q = np.sum([B.T @ np.linalg.solve(K.toarray(), B) for K, B in sides], axis=0)
         np.testing.assert_allclose(found.diagonal, Q.diagonal(), rtol=SINGLE)
         Q = Q[np.ix_(found.M.order, found.M.order)]
         product = np.column_stack([found.M.product(column) for column in Q])
@@ -182,7 +183,7 @@ def test_the_compliance_is_nearly_the_same_and_no_larger(name: str) -> None:
     assert ratio[-1] <= 1 + 1e-9
 
 
-@pytest.mark.parametrize("scene", [*SCENES.values(), *map(read_scene, scene_names()[-9:-1])])
+@pytest.mark.parametrize("scene", [*SCENES.values(), *map(read_scene, scene_names()[-9:-4])])
 def test_the_junction_and_the_clamped_edges_are_kept(scene: Any) -> None:
     model = JointModel.of(scene)
     coarse = model.graded()

@@ -10,7 +10,7 @@ import pytest
 from riveted_strips import FORCE, STIFFNESS, C, Tables, approach, joint_scene, strips
 from small_joints import JOINT as PLATES
 from small_joints import make_scene, untied
-from superelements import stiffnesses, write_part
+from superelements import stiffnesses, write_part, write_plates
 
 from harness.scene.solution import solve
 from problems.build import adopts_model, load_case, prepared
@@ -161,10 +161,7 @@ def test_a_clamp_through_a_stack_counts_once_and_a_rivet_in_each_contact() -> No
 
 
 def test_superelements_go_through_the_same_stages(tmp_path: Path) -> None:
-    plates = joined(ONCE)
-    nodes = np.column_stack([plates.joint.nodes_of("a"), np.zeros(45)])
-    matrices = stiffnesses(plates.joint)  # type: ignore[arg-type]
-    parts = [write_part(tmp_path, name, K, nodes) for name, K in zip("ab", matrices, strict=True)]
+    parts = write_plates(tmp_path, joined(ONCE).joint)  # type: ignore[arg-type]
     effects = [{"kind": "initial_gap", "mean": 0.4}, *EFFECTS[1:3]]
     one, other = solve(joined(ONCE, effects)), solve(joined(ONCE, effects, {"part": parts}))
     for mine, theirs in zip(one.stages, other.stages, strict=True):
@@ -216,12 +213,6 @@ def test_stages_share_the_stiffness_that_they_have_in_common() -> None:
     assert scenes[1].model is not None
     with pytest.raises(InputError, match="no stages here"):
         prepared(joined(ONCE))
-
-
-def test_springs_have_a_key_of_their_own_in_the_sparse_form() -> None:
-    """What was proven of K without springs does not hold with them."""
-    scene = joined([])
-    assert prepared(scene, form="sparse").key != prepared(untied(scene), form="sparse").key
 
 
 def test_a_name_is_in_no_key_and_stages_are() -> None:
@@ -289,6 +280,7 @@ def test_a_shift_of_rivets_that_a_stage_sets_gives_them_no_approach() -> None:
 PIN = [[390.0, 100.0]]
 HALVES = [{"name": "1", "on": ["rivets[2:4]"]}, {"name": "2", "on": ["rivets[0:2]"]}]
 SUPPORTS = [[0.0, 10.0], [400.0, 10.0], [200.0, 200.0]]
+RIVETED = "effect[2] (installed_fasteners)"
 BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"name": "1", "on": ["clamp"]}], {}, "stage[0] (1).on = 'clamp'", "did you mean clamps?"),
     ([CLAMP, {"name": "2", "on": ["clamps[0:1]"]}], {}, "stage[1] (2).on = 'clamps[0:1]'", "set twice"),
@@ -302,31 +294,21 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"on": ["clamps"]}], {}, "stage[0].name", "required"),
     ([CLAMP | {"on": "clamps"}], {}, "stage[0].on = 'clamps'", "must be a list"),
     ([CLAMP | {"of": []}], {}, "stage[0].of", "did you mean off?"),
-    (
-        [{"name": "1", "on": ["rivets"]}],
-        {"approach": 0.1},
-        "effect[2] (installed_fasteners).approach",
-        "left out",
-    ),
+    ([{"name": "1", "on": ["rivets"]}], {"approach": 0.1}, f"{RIVETED}.approach", "left out"),
     ([{"name": "1", "on": ["tool"]}], {}, "effect[4] (rigid_tool).name = 'tool'", "makes a contact"),
-    (
-        [{"name": "1", "on": ["rivets[0:3]"]}],
-        {},
-        "effect[2] (installed_fasteners).name",
-        "or none: 3 is in none",
-    ),
+    ([{"name": "1", "on": ["rivets[0:3]"]}], {}, f"{RIVETED}.name", "or none: 3 is in none"),
     ([CLAMP], {"name": "clamps"}, "effect[2].name = 'clamps'", "effect[1] has it"),
     ([CLAMP], {"name": "contacts"}, "effect[2].name = 'contacts'", "the forces of contacts"),
     ([CLAMP], {"name": "initial_gap"}, "effect[2].name = 'initial_gap'", "calls its effects"),
     (
         [{"name": "1", "on": ["rivets"]}],
         {"points": PIN},
-        "effect[2] (installed_fasteners).points",
+        f"{RIVETED}.points",
         "separate places: installed_fasteners acts at the same ones, in stage 1",
     ),
     ([CLAMP], {"approach": [0.1, 0.2]}, "approach", "one for each of 4 springs"),
     ([CLAMP], {"preload": -1.0}, "preload", "in N"),
-    (HALVES, {"preload": [1.0, 2.0, 3.0]}, "effect[2] (installed_fasteners).preload", "each of 4 points"),
+    (HALVES, {"preload": [1.0, 2.0, 3.0]}, f"{RIVETED}.preload", "each of 4 points"),
     (HALVES, {"points": [*RIVETS[:3], RIVETS[2]]}, "points[3] = [210.0, 20.0]", "points[2] is there, too"),
     (
         [{"name": "hold", "on": ["legs"]}, {"name": "let go", "off": ["legs[0:2]"]}],

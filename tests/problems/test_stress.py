@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import scipy.sparse as sp
 from commands import harness
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu, spsolve
 from small_joints import degrees
 
 from harness.scene.solution import solve
@@ -85,7 +85,7 @@ def test_a_square_plate_under_pressure_at_its_middle(clamped: bool, moment: floa
 def test_a_clamped_square_plate_at_the_middle_of_an_edge() -> None:
     """σ = −6 · 0.0513 q a²/t², from the two rows of Gauss points beside the edge."""
     exact, errors = -6 * 0.0513 * Q * SIDE**2 / T**2, []
-    for elements in (8, 16, 32):
+    for elements in (8, 32):
         stress = pressed(square(elements), clamped=True)
         first, second = np.unique(stress.places[:, 0])[:2]
         a, b = (near(stress, x, SIDE / 2, 2)[0] for x in (first, second))
@@ -148,12 +148,12 @@ def test_no_error_changes_a_stress_by_more_than_its_energy_allows(pad: float | N
         largest = np.maximum(abs(stress.components).max(axis=1), stress.von_mises)
         return np.asarray(largest / (stress.sensitivity * np.sqrt(e @ K @ e)))
 
-    units = np.eye(plate.size)[free]
+    units, inverse = np.eye(plate.size)[free], splu(sp.csc_array(K[free][:, free]))
     operators = np.array([part_stress("p", model, (), unit, NOWHERE).components for unit in units])
     shares = []
     for k in range(40):
         e = np.zeros(plate.size)
-        for values in (random.standard_normal(len(free)), spsolve(K[free][:, free], operators[:, k, k % 2])):
+        for values in (random.standard_normal(len(free)), inverse.solve(operators[:, k, k % 2])):
             e[free] = values
             shares.append(changed(e).max())
     assert 0.05 < max(shares) <= 1.0

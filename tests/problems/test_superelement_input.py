@@ -33,22 +33,16 @@ def two(
     return [good, write_part(folder, "b", K, xyz, normals, **more)]
 
 
-def asymmetric() -> Array:
-    K = HELD.copy()
-    K[0, 1] = 3.0
-    return K
+def changed(array: Array, where: Any, value: Any) -> Array:
+    """A copy with another entry, or row."""
+    other = array.copy()
+    other[where] = value
+    return other
 
 
-def infinite() -> Array:
-    K = HELD.copy()
-    K[3, 3] = np.inf
-    return K
-
-
-def tilted(k: int, normal: list[float]) -> Array:
-    normals = UP.copy()
-    normals[k] = normal
-    return normals
+ASYMMETRIC, INFINITE = changed(HELD, (0, 1), 3.0), changed(HELD, (3, 3), np.inf)
+BEYOND, DOUBLED = changed(NODES, (3, 0), 2.0**63), changed(NODES, 1, NODES[0] + 1e-7)
+SHORT = changed(UP, 4, [0, 0, 0.9])
 
 
 def missing(folder: Path) -> list[Tables]:
@@ -64,16 +58,16 @@ FILES: dict[str, tuple[Callable[[Path], list[Tables]], str, str, str]] = {
     ),
     "an id twice": (lambda f: two(f, id=[1, 2, 3, 3, *range(5, 25)]), "id", "3", "each id once"),
     "an id that is no number": (lambda f: two(f, id=[1.5, *range(2, 25)]), "id", "1.5", "whole numbers"),
-    "another planet": (lambda f: two(f, xyz=_beyond()), "line 5", "4,9.22", "up to 1e+15"),
-    "two nodes at one place": (lambda f: two(f, xyz=_doubled()), "x, y, z", "1 and 2", "one node at each"),
-    "asymmetric": (lambda f: two(f, asymmetric()), "K[0, 1] and K[1, 0]", "[3.0, 0.0]", "1e-10"),
-    "not finite": (lambda f: two(f, infinite()), "K", "NaN or infinity", "finite"),
-    "a normal too short": (lambda f: two(f, normals=tilted(4, [0, 0, 0.9])), "nx, ny, nz", "5", "length 1"),
+    "another planet": (lambda f: two(f, xyz=BEYOND), "line 5", "4,9.22", "up to 1e+15"),
+    "two nodes at one place": (lambda f: two(f, xyz=DOUBLED), "x, y, z", "1 and 2", "one node at each"),
+    "asymmetric": (lambda f: two(f, ASYMMETRIC), "K[0, 1] and K[1, 0]", "[3.0, 0.0]", "1e-10"),
+    "not finite": (lambda f: two(f, INFINITE), "K", "NaN or infinity", "finite"),
+    "a normal too short": (lambda f: two(f, normals=SHORT), "nx, ny, nz", "5", "length 1"),
     "contact of neither": (lambda f: two(f, contact=[2, *[1] * 23]), "contact", "ids 1", "0 or 1"),
     "no surface": (lambda f: two(f, contact=[1, 1, *[0] * 22]), "contact", "2", "at least three"),
     "no file": (missing, "superelement", "No such file", "readable"),
     "normal not kept": (
-        lambda f: two(f, normals=tilted(4, [0, 0.6, 0.8])), "nodes", "ids 5", "along the normal",
+        lambda f: two(f, normals=changed(UP, 4, [0, 0.6, 0.8])), "nodes", "ids 5", "along the normal",
     ),
     "a dof twice": (lambda f: two(f, dofs=[3, 3]), "part.1.dofs", "[3, 3]", "each once"),
     "dofs against labels": (
@@ -87,18 +81,6 @@ def _shorter(folder: Path) -> Tables:
     part = write_part(folder, "b", HELD, NODES)
     write_nodes(folder / "b.csv", NODES[:20])
     return part
-
-
-def _doubled() -> Array:
-    xyz = NODES.copy()
-    xyz[1] = xyz[0] + 1e-7
-    return xyz
-
-
-def _beyond() -> Array:
-    xyz = NODES.copy()
-    xyz[3, 0] = 2.0**63
-    return xyz
 
 
 @pytest.mark.parametrize("case", FILES)
@@ -126,14 +108,14 @@ def refused(parts: list[Tables], *effects: Tables, **joint: Any) -> list[Fault]:
 
 
 def test_all_files_are_checked_at_once(tmp_path: Path) -> None:
-    parts = two(tmp_path, asymmetric(), id=[1, 1, *range(3, 25)])
-    first = write_part(tmp_path, "a", infinite(), NODES)
+    parts = two(tmp_path, ASYMMETRIC, id=[1, 1, *range(3, 25)])
+    first = write_part(tmp_path, "a", INFINITE, NODES)
     assert len(refused([first, parts[1]])) == 3
 
 
 PAIRS: dict[str, tuple[Callable[[Path], list[Tables]], str, str]] = {
     "reversed normals": (lambda f: two(f, normals=-UP), "24 nodes, ids 1, 2", "point the same way"),
-    "one reversed": (lambda f: two(f, normals=tilted(6, [0, 0, -1])), "1 nodes, ids 7", "reversed?"),
+    "one reversed": (lambda f: two(f, normals=changed(UP, 6, [0, 0, -1])), "1 nodes, ids 7", "reversed?"),
     "too far": (lambda f: two(f, xyz=NODES + np.array([0, 0, 7.5])), "24 too far: 1 (7.5 mm), 2", "5 mm"),
     "beside": (lambda f: two(f, xyz=NODES + np.array([900.0, 0, 0])), "24 are beyond its surface", "pairing"),
     "on a line": (
@@ -165,9 +147,7 @@ def test_nodes_beyond_the_other_part_and_too_far_from_it_are_no_contacts(tmp_pat
 
 
 def test_a_node_far_from_all_others_is_told(tmp_path: Path) -> None:
-    xyz = NODES.copy()
-    xyz[5] = 9999.0
-    (said,) = scene_from(two(tmp_path, xyz=xyz)).unusual
+    (said,) = scene_from(two(tmp_path, xyz=changed(NODES, 5, 9999.0))).unusual
     assert "part.b, nodes far from all others = 1" in said
     assert said.endswith("Ids 6")
 

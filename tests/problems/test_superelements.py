@@ -2,6 +2,7 @@
 
 import os
 import pickle
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,21 @@ import pytest
 import scipy.sparse as sp
 import skfem
 from argyris_plates import bending
+from scipy.sparse.linalg import splu
 from small_joints import make_scene
-from superelements import Array, Tables, flat, scene_from, solved, stiffnesses, two_plates, write_part
+from superelements import (
+    Array,
+    Tables,
+    flat,
+    scene_from,
+    solved,
+    stiffnesses,
+    two_plates,
+    write_part,
+    write_plates,
+)
 
+from harness.scene.solution import Solution
 from problems.build import load_case, model_of, prepared
 from problems.effects.part_position import PartPosition
 from problems.errors import InputError
@@ -45,35 +58,30 @@ def built_in(*effects: Tables) -> JointScene:
     return scene_of({"joint": JOINT.model_dump(exclude_unset=True), "effect": list(effects)})
 
 
-def plates(folder: Path, format: str = "npz", **more: Any) -> list[Tables]:
-    """The parts of the built-in joint."""
-    K = stiffnesses(JOINT)
-    return [
-        write_part(folder, name, K[k], flat(JOINT.nodes), format=format, **more)
-        for k, name in enumerate("ab")
-    ]
+@cache
+def built_in_answer() -> Solution:
+    return solved(built_in(*EFFECTS))
 
 
 @pytest.mark.parametrize("format", ["npz", "mtx", "op4", "abaqus"])
 def test_the_built_in_joint_as_superelements_has_its_answer(format: str, tmp_path: Path) -> None:
     if format == "op4":
         pytest.importorskip("pyyeti")
-    ours, theirs = solved(built_in(*EFFECTS)), solved(scene_from(plates(tmp_path, format), *EFFECTS))
+    parts = write_plates(tmp_path, JOINT, format=format)
+    ours, theirs = built_in_answer(), solved(scene_from(parts, *EFFECTS))
     assert 0 < (ours.lam > 0).sum() < len(ours.lam)
     for name in ("x", "gap"):
         np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1e-12)
     np.testing.assert_allclose(theirs.lam, ours.lam, rtol=1e-8, atol=1e-8)
-    (one, load), (other, other_load) = (
-        (prepared(s), load_case(s)) for s in (built_in(*EFFECTS), theirs.problem.scene)
-    )
-    assert (one.assembly.A != other.assembly.A).nnz == 0
-    np.testing.assert_array_equal(load.f, other_load.f)
+    one, other = ours.problem, theirs.problem
+    assert (one.prepared.assembly.A != other.prepared.assembly.A).nnz == 0
+    np.testing.assert_array_equal(one.load.f, other.load.f)
 
 
 @pytest.mark.parametrize(("format", "kept"), [("abaqus", 0.0), ("dmig", 1e-9)])
 def test_labels_say_which_row_is_which(format: str, kept: float, tmp_path: Path) -> None:
     """kept : the relative rounding of the format, ten digits of DMIG."""
-    parts = plates(tmp_path, format, id=np.arange(1, 46))
+    parts = write_plates(tmp_path, JOINT, format=format, id=np.arange(1, 46))
     K = stiffnesses(JOINT)
     order = np.random.default_rng(2).permutation(45)
     for part in parts:  # the rows of the table in another order
@@ -83,7 +91,7 @@ def test_labels_say_which_row_is_which(format: str, kept: float, tmp_path: Path)
     own = scene.joint.parts[0]
     np.testing.assert_array_equal(own.nodes.xyz[own.node, :2], JOINT.nodes)
     np.testing.assert_allclose(own.stiffness, K[0], rtol=kept)
-    error = abs(np.sort(solved(scene).gap) - np.sort(solved(built_in(*EFFECTS)).gap)).max()
+    error = abs(np.sort(solved(scene).gap) - np.sort(built_in_answer().gap)).max()
     assert error < (1e-6 if kept else 1e-9)
 
 
@@ -92,11 +100,11 @@ ROWS = {"table": (0, [3]), "ids": (1, [3]), "directions": (2, [1, 2, 3])}
 
 @pytest.mark.parametrize("order", ROWS)
 def test_rows_without_labels_are_as_the_scene_says(order: str, tmp_path: Path) -> None:
-    """Ids and places in another order than the rows of K: asked; the same gaps as in the order of the ids;
-    and an order that does not fit K is told."""
+    """Ids and places in another order than the rows of K: asked; the gaps of the built-in joint; and an
+    order that does not fit K is told."""
     others, dofs = np.random.default_rng(4).permutation(45), ROWS[order][1]
     K = [np.kron(np.diag([0.0] * (len(dofs) - 1) + [1.0]), one) for one in stiffnesses(JOINT)]
-    parts, plain = [], scene_from(plates(tmp_path), *EFFECTS)
+    parts = []
     for name, one in zip("ab", K, strict=True):
         one[range(len(one) - 45), range(len(one) - 45)] = 1e3  # in the plane, on springs
         rows = others if order == "table" else np.arange(45)
@@ -109,13 +117,13 @@ def test_rows_without_labels_are_as_the_scene_says(order: str, tmp_path: Path) -
         scene_from(parts)
     right = scene_from([part | {"rows": order} for part in parts], *EFFECTS)
     wrong = scene_from([part | {"rows": "ids" if order == "table" else "table"} for part in parts], *EFFECTS)
-    np.testing.assert_allclose(solved(right).gap, solved(plain).gap, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(solved(right).gap, built_in_answer().gap, rtol=0, atol=1e-12)
     assert [f'the order "{order}"' in said for said in wrong.unusual] == [True, True]
     assert not right.unusual
 
 
 def test_a_file_replaced_with_its_size_and_time_is_read_anew(tmp_path: Path) -> None:
-    (part, other), path = plates(tmp_path), tmp_path / "a.npz"
+    (part, other), path = write_plates(tmp_path, JOINT), tmp_path / "a.npz"
     assert scene_from([part, other]).joint.parts[0].stiffness[0, 0] == stiffnesses(JOINT)[0][0, 0]
     before = path.stat()
     np.savez(path, K=2 * stiffnesses(JOINT)[0])
@@ -125,7 +133,7 @@ def test_a_file_replaced_with_its_size_and_time_is_read_anew(tmp_path: Path) -> 
 
 
 def test_one_matrix_of_several(tmp_path: Path) -> None:
-    part, K = plates(tmp_path)[0], stiffnesses(JOINT)[0]
+    part, K = write_plates(tmp_path, JOINT)[0], stiffnesses(JOINT)[0]
     np.savez(tmp_path / "a.npz", KAA=K, MAA=np.eye(45))
     with pytest.raises(InputError, match=r"KAA.*MAA.*matrix"):
         scene_from([part])
@@ -229,9 +237,8 @@ def disc(refined: int, turned: float) -> tuple[Array, Array]:
     inner = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
     kept = basis.nodal_dofs[0, inner]
     rest = np.setdiff1d(np.arange(basis.N), np.concatenate([kept, basis.get_dofs().all()]))
-    condensed = K[kept][:, kept] - K[kept][:, rest] @ np.linalg.solve(
-        K[rest][:, rest].toarray(), K[rest][:, kept].toarray()
-    )
+    inverse = splu(sp.csc_array(K[rest][:, rest]))
+    condensed = K[kept][:, kept] - K[kept][:, rest] @ inverse.solve(K[rest][:, kept].toarray())
     return (condensed + condensed.T) / 2, basis.mesh.p[:, inner].T
 
 
@@ -404,7 +411,7 @@ def test_a_tool_and_a_third_part(tmp_path: Path) -> None:
 
 
 def test_the_key_is_that_of_what_the_files_hold(tmp_path: Path) -> None:
-    parts = plates(tmp_path)
+    parts = write_plates(tmp_path, JOINT)
     first = scene_from(parts, FASTENERS)
     assert scene_from(parts, FASTENERS).key == first.key
     assert scene_from(parts).assembly_key == first.assembly_key
@@ -457,7 +464,7 @@ def test_a_free_part_with_rotations_is_told_by_its_six_motions(tmp_path: Path) -
 
 
 def test_a_scene_travels_to_another_process(tmp_path: Path) -> None:
-    scene = scene_from(plates(tmp_path), *EFFECTS)
+    scene = scene_from(write_plates(tmp_path, JOINT), *EFFECTS)
     _ = load_case(scene).g
     again = pickle.loads(pickle.dumps(scene))
     assert again.key == scene.key

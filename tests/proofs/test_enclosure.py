@@ -53,23 +53,21 @@ def doubled(hi: np.ndarray, lo: np.ndarray | float = 0.0) -> DoubleDouble:
 @pytest.mark.parametrize("kind", ["dense", "dense, by columns", "sparse"])
 @pytest.mark.parametrize("cases", [1, 3])
 @pytest.mark.parametrize("sharp", [True, False])
-@pytest.mark.parametrize("seed", range(15))
 def test_a_residual_lies_within_its_bound(
-    kind: str, cases: int, seed: int, sharp: bool, monkeypatch: pytest.MonkeyPatch
+    kind: str, cases: int, sharp: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if kind == "dense, by columns":
         monkeypatch.setattr(enclosure, "WIDTH", 4)
-    rng = np.random.default_rng(seed)
-    M, hi = wild(rng, 6, 9) * (rng.random((6, 9)) < 0.7), wild(rng, 9, cases)
-    x = doubled(hi, hi * rng.uniform(-1e-16, 1e-16, hi.shape))
-    value = (M @ hi) * (1 + 1e-15 * rng.standard_normal((6, cases)))
-    total = residual_of(value, M, x, kind, sharp)
-    for column in range(cases):
-        assert max(missed(total, column, wanted_of(value, M, x, column))) <= 0
-    sizes = abs(M) @ abs(hi).max(axis=1)
-    assert (
-        total.error.max(axis=1) <= (1e-27 if sharp else 1e-20) * sizes + 3e-16 * abs(total.value).max(axis=1)
-    ).all()
+    for seed in range(15):
+        rng = np.random.default_rng(seed)
+        M, hi = wild(rng, 6, 9) * (rng.random((6, 9)) < 0.7), wild(rng, 9, cases)
+        x = doubled(hi, hi * rng.uniform(-1e-16, 1e-16, hi.shape))
+        value = (M @ hi) * (1 + 1e-15 * rng.standard_normal((6, cases)))
+        total = residual_of(value, M, x, kind, sharp)
+        for column in range(cases):
+            assert max(missed(total, column, wanted_of(value, M, x, column))) <= 0
+        most = (1e-27 if sharp else 1e-20) * (abs(M) @ abs(hi).max(axis=1))
+        assert (total.error.max(axis=1) <= most + 3e-16 * abs(total.value).max(axis=1)).all()
 
 
 @pytest.mark.parametrize("width", [7, 50])

@@ -23,20 +23,19 @@ from solvers.libraries.proxqp import ProxQp
 from solvers.libraries.qpsolvers import TIME_LIMIT, TOLERANCE
 from solvers.registry import make_solver
 
-LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")
-VARIANTS: list[tuple[str, dict[str, Any]]] = [
-    *((name, {}) for name in TESTED),
-    ("clarabel", {"direct_solve_method": "qdldl"}),
-    ("proxqp", {"backend": "primal_ldlt"}),
-    ("proxqp", {"backend": "primal_dual_ldlt"}),
-    ("piqp", {"backend": "sparse"}),
-    ("cvxpy", {"via": "CLARABEL"}),
+VARIANTS: list[tuple[str, dict[str, Any], tuple[Form, ...]]] = [
+    *((name, {}, FORMS) for name in TESTED),
+    ("clarabel", {"direct_solve_method": "qdldl"}, FORMS),
+    ("proxqp", {"backend": "primal_ldlt"}, DENSE_FORMS),
+    ("proxqp", {"backend": "primal_dual_ldlt"}, DENSE_FORMS),
+    ("piqp", {"backend": "sparse"}, DENSE_FORMS),  # which the sparse form takes anyway
+    ("cvxpy", {"via": "CLARABEL"}, ("dual",)),  # after the model, which is compiled alike
 ]
 
 
-@pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
-def test_conformance(name: str, options: dict[str, Any]) -> None:
-    assert [str(finding) for finding in run(lambda: make_solver(name, options))] == []
+@pytest.mark.parametrize(("name", "options", "forms"), VARIANTS, ids=str)
+def test_conformance(name: str, options: dict[str, Any], forms: tuple[Form, ...]) -> None:
+    assert [str(finding) for finding in run(lambda: make_solver(name, options), forms)] == []
 
 
 def solved(

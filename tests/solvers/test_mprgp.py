@@ -1,5 +1,6 @@
 """MPRGP: its steps, what they count, and where it starts."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,12 @@ TOLERANCE = 1e-10
 KINDS = pytest.mark.parametrize("preconditioner", PRECONDITIONERS)
 
 
-def strips(contacts: int) -> tuple[Prepared, LoadCase]:
-    """Contacts in a row, five windows of M long and more, with nearly as many open as closed."""
-    prepared = make_strips(contacts)
-    return prepared, make_load(3, prepared)[1]
+@cache
+def strips() -> tuple[Prepared, LoadCase, Vector, Vector]:
+    """Contacts in a row, five windows of M long and more, nearly as many open as closed; and x and λ."""
+    prepared = make_strips(400)
+    _, load = make_load(3, prepared)
+    return prepared, load, *solve_by_nnls(prepared, load)
 
 
 def opened(preconditioner: str, prepared: Prepared) -> tuple[Mprgp, Any]:
@@ -31,7 +34,7 @@ def opened(preconditioner: str, prepared: Prepared) -> tuple[Mprgp, Any]:
 
 @KINDS
 def test_no_step_increases_the_objective(preconditioner: str) -> None:
-    prepared, load = strips(400)
+    prepared, load, *_ = strips()
     Q, p = prepared.Q, load.p
     solver, state = opened(preconditioner, prepared)
     metric = solver._metric(state)
@@ -60,8 +63,7 @@ def test_the_products_that_are_told_are_those_made(
         return original(Q, v)
 
     monkeypatch.setattr(compliance, "product", counted)
-    prepared, load = strips(400)
-    x, lam = solve_by_nnls(prepared, load)
+    prepared, load, x, lam = strips()
     assert 0 < np.count_nonzero(lam) < len(lam)
     solver, state = opened(preconditioner, prepared)
     made.clear()

@@ -1,6 +1,7 @@
 """A banded M ≈ Q⁻¹, and contact sets with it, corrected by products with Q: cold, warm and batched."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from small_joints import two_parts
-from small_problems import definite, make_load, make_prepared, problem_in, solve_by_nnls
+from small_problems import definite, make_beam, make_load, make_prepared, problem_in, solve_by_nnls
 from strip_scene import write_strip
 
 from harness.conformance.known_problems import contact_rows
@@ -51,11 +52,12 @@ def chain(m: int) -> np.ndarray:
     return np.diag(rng.uniform(0.1, 1, m) + k + np.r_[0, k[:-1]]) - np.diag(k[:-1], 1) - np.diag(k[:-1], -1)
 
 
-def decaying() -> np.ndarray:
-    """Of the distance between contacts, numbered line by line; slowly, so that M needs sweeps."""
+@cache
+def decaying() -> Prepared:
+    """Q of the distance between contacts, numbered line by line; it decays slowly, so that M needs sweeps."""
     nodes = np.array([(i, j) for i in range(LINES) for j in range(ACROSS)], dtype=float)
     distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
-    return np.asfortranarray(1 / (1 + distance / 2) + 0.01 * np.eye(LINES * ACROSS))
+    return dual_alone(np.asfortranarray(1 / (1 + distance / 2) + 0.01 * np.eye(LINES * ACROSS)))
 
 
 def session_of(data: Prepared, form: str, tolerance: float = TOLERANCE) -> SolverSession:
@@ -64,8 +66,8 @@ def session_of(data: Prepared, form: str, tolerance: float = TOLERANCE) -> Solve
     return made
 
 
-def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = TOLERANCE) -> Answer:
-    return session_of(dual_alone(Q), "dual", tolerance).next(DualLoadCase(p * 0, -p, p), None)
+def solved(p: np.ndarray, tolerance: float = TOLERANCE) -> Answer:
+    return session_of(decaying(), "dual", tolerance).next(DualLoadCase(p * 0, -p, p), None)
 
 
 def residual(Q: np.ndarray, p: np.ndarray, lam: np.ndarray | None) -> float:
@@ -127,7 +129,7 @@ def test_one_factor_takes_the_place_of_another_but_not_of_its_copy(tmp_path: Pat
 
 
 def test_m_has_a_narrow_band_where_q_decays_alone() -> None:
-    Q = decaying()
+    Q = decaying().Q
     v = np.random.default_rng(2).standard_normal(len(Q))
     for Q_made, narrow in ((Q, True), (definite(len(Q), 1), False), (Q + 100 * np.outer(v, v), False)):
         dense = DenseCompliance(np.asfortranarray(Q_made))
@@ -173,9 +175,9 @@ def test_cold_warm_and_batched_in_any_order_are_the_answer_of_nnls(
 @pytest.mark.parametrize(("mean", "most"), [(-2.5, 5), (0.0, 10), (3.0, 10), (8.0, 11)])
 def test_a_loose_tolerance_needs_no_more_products_than_a_tight_one(mean: float, most: int) -> None:
     """Steps that are not conjugate would take 7, 11, 11 and 12."""
-    Q = decaying()
+    Q = decaying().Q
     p = np.random.default_rng(3).standard_normal(len(Q)) + mean
-    answers = [solved(Q, p, tolerance) for tolerance in (1e-2, 1e-4, 1e-8, 1e-10)]
+    answers = [solved(p, tolerance) for tolerance in (1e-2, 1e-4, 1e-8, 1e-10)]
     assert [answer.status for answer in answers] == ["solved"] * 4
     products = [answer.iterations for answer in answers]
     assert products == sorted(products)
@@ -205,10 +207,8 @@ def test_an_edge_of_contact_on_a_fine_mesh_moves_in_few_sets(half_waves: int, le
     """A beam over obstacles; 5 to 9 sets, where pivoting alone tries 103 to 237. The second answer starts
     from forces where contact opens.
     """
-    x, D = np.linspace(0, 1, 600), np.diff(np.eye(600), 2, axis=0)
-    Q = np.linalg.inv(1e4 * D.T @ D + 1e-2 * np.eye(600))
-    sweeps = Sweeps(dual_alone(np.asfortranarray((Q + Q.T) / 2)))
-    p, start = level + np.cos(half_waves * np.pi * x), None
+    sweeps = Sweeps(make_beam(600))
+    p, start = level + np.cos(half_waves * np.pi * np.linspace(0, 1, 600)), None
     for load in (DualLoadCase(0 * q, -q, q) for q in (p, np.roll(p, 80))):
         case = sweeps.solved(load, 1e-8, start)
         assert sweeps.answer(case, 1e-8).status == "solved"
@@ -262,8 +262,8 @@ def test_a_contact_that_a_change_of_load_opens_has_no_force_left(opened: int) ->
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.1])
 def test_a_start_whose_forces_and_gaps_do_not_belong_together_costs_sweeps_alone(scale: float) -> None:
-    Q, random = decaying(), np.random.default_rng(0)
-    sweeps, p = Sweeps(dual_alone(Q)), random.standard_normal(len(Q))
+    Q, random = decaying().Q, np.random.default_rng(0)
+    sweeps, p = Sweeps(decaying()), random.standard_normal(len(Q))
     load = DualLoadCase(p * 0, -p, p)
     lam, gap = sweeps.vectors(sweeps.solved(load, TOLERANCE))
     start = WarmStart(load, lam * (1 + scale * random.standard_normal(len(lam))), gap)
@@ -276,15 +276,14 @@ def test_a_start_whose_forces_and_gaps_do_not_belong_together_costs_sweeps_alone
 @pytest.mark.parametrize("scale", [1e5, 1e6, 1e7])
 def test_rounding_above_the_target_ends_the_sweeps(scale: float) -> None:
     """Loads so large that |y_C| stays above a fiftieth of the tolerance: what no longer halves is enough."""
-    Q, p = decaying(), scale * np.random.default_rng(3).standard_normal(LINES * ACROSS)
-    answer = solved(Q, p)
+    answer = solved(scale * np.random.default_rng(3).standard_normal(LINES * ACROSS))
     assert answer.status == "solved"
     assert answer.iterations <= 13
 
 
 def test_unsettled_forces_are_cut_at_zero_and_judged_as_such() -> None:
-    Q, p = decaying(), np.random.default_rng(3).standard_normal(LINES * ACROSS)
-    sweeps = Sweeps(dual_alone(Q), most=2)
+    Q, p = decaying().Q, np.random.default_rng(3).standard_normal(LINES * ACROSS)
+    sweeps = Sweeps(decaying(), most=2)
     case = sweeps.solved(DualLoadCase(p * 0, -p, p), TOLERANCE)
     assert not case.settled
     answer = sweeps.answer(case, TOLERANCE)
