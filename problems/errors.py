@@ -69,6 +69,13 @@ class InputError(ValueError):
         return cls([Fault(str(where), key, value, allowed)])
 
 
+def refuse_text(where: str, **lists: object) -> None:
+    """Raise InputError for each text in place of a list, whose letters would be taken for the entries."""
+    allowed = "a list of texts, not one text"
+    if faults := [Fault(where, name, text, allowed) for name, text in lists.items() if isinstance(text, str)]:
+        raise InputError(faults)
+
+
 def read_all(read: Callable[[In], Out], inputs: Iterable[In]) -> list[Out]:
     """The result of `read` for each input. Raises InputError with the faults of all."""
     results: list[Out] = []

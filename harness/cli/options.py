@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial, update_wrapper
 from inspect import Signature, signature
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -26,7 +27,15 @@ LONGEST_LINE = 200  # characters of a file quoted in a message
 
 
 def option(metavar: str, help: str, *names: str, **limits: Any) -> Any:
-    return typer.Option(*names, metavar=metavar, help=help, **limits)
+    callback = _refuse_nan if limits else None
+    return typer.Option(*names, metavar=metavar, help=help, callback=callback, **limits)
+
+
+def _refuse_nan(value: Any) -> Any:
+    """The value of an option with limits, none of which stops NaN."""
+    if isinstance(value, float) and isnan(value):
+        raise typer.BadParameter("nan is no number")
+    return value
 
 
 FormName = Literal["primal", "dual", "sparse"]

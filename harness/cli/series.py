@@ -79,7 +79,7 @@ def series(
 
     \b
     Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
-                3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
+                3 a case, or --find, could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with options.resumable() as console:
         from harness.commands.limit_search import tolerance as find_limit
@@ -97,7 +97,7 @@ def series(
                 raise InputError.one("--find", "KEY=LOW:HIGH", find, "with --allow-gap, without --sweep")
             goal, told = (allow_gap, share, resolution), ConsoleReporter(console, plain=True)
             answer = find_limit(scene, out, find, *goal, cases, settings, scheduler, told)
-            kind = "pass" if answer.passed else "fail"
+            kind = {True: "pass", False: "fail", None: ""}[answer.passed]
             raise typer.Exit(show_verdict(kind, answer.sentences, console))
         outcome = run_series(
             scene,

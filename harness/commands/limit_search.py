@@ -10,7 +10,8 @@ above, the other the least k' whose interval reaches s. If the share is monotone
 their results with 95 % confidence.
 
 Fresh cases, those of the next seed, tell the share at v: if their interval is below s, v moves half-way to
-the end where the share is surely kept, and so on. Rows of a table chose v themselves.
+the end where the share is surely kept, and so on. If the interval reaches s only with the cases that may keep
+the limit or not, it cannot be judged. Rows of a table chose v themselves.
 """
 
 from bisect import bisect_left
@@ -43,6 +44,7 @@ from report.document.numbers import out_of
 from .load_case_series import run_series
 
 RESOLUTION = 0.01  # of the range, by default
+UNJUDGED = "Whether it is kept cannot be judged"
 OUTPUTS = ("report.md", "shares.csv", "shares.png")
 UNCHECKED = SeriesOptions(check=0)
 
@@ -58,15 +60,16 @@ class Tolerance:
         do, or neither.
     interval : tuple of (float, float)
         Where it is with 95 % confidence; infinite where that is beyond the range.
-    passed : bool
-        Whether a value, or the whole range, keeps the share, and fresh cases do not contradict it.
+    passed : bool, optional
+        Whether a value, or the whole range, keeps the share, and fresh cases do not contradict it; None if
+        cases of which that is not known decide it.
     sentences : tuple of str
         The outcome in words.
     """
 
     value: float | None
     interval: tuple[float, ...]
-    passed: bool
+    passed: bool | None
     sentences: tuple[str, ...]
 
 
@@ -190,7 +193,7 @@ def tolerance(
     lock = records.locked(directory, TOLERANCE, outputs=OUTPUTS)
     with lock, shared(scheduler, console_of(reporter)) as address:
         first, last = (bounds(value, None)[1] for value in (values[0], values[-1]))
-        if np.array_equal(first, last, equal_nan=True):
+        if np.array_equal(first, last, equal_nan=True) and not np.isnan(first).all():
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
         outcome, count = searched(kept, values, share, len(first)), len(first)
         limit = f"{allow_gap_mm:g} mm in {100 * share:g} % of the joints"
@@ -198,16 +201,20 @@ def tolerance(
         value, rising = outcome.value, kept(values[0])[0] < kept(values[-1])[0]
         while value is not None and not cases.gaps:
             fresh, possible = kept(value, (cases.seed or 0) + 1)
-            words = share_in_words(fresh, count, possible - fresh)
+            unknown = possible - fresh
+            words = share_in_words(fresh, count, unknown)
             said.append(f"At {value:g} it is kept in {fresh} of {count} fresh cases, proven: {words}.")
-            outcome = replace(outcome, value=value, passed=share_interval(fresh, count)[1] >= share)
+            keeps, may = (share_interval(fresh, count, some)[1] >= share for some in (0, unknown))
+            outcome = replace(outcome, value=value, passed=keeps or (None if may else False))
+            if may and not keeps:
+                said.append(f"{UNJUDGED}: of {out_of(unknown, count, 'fresh case')} it is not known.")
             safe = min(max(outcome.interval[rising], values[0]), values[-1])
-            if outcome.passed or value == safe:
+            if may or value == safe:
                 break
             value = values[(values.index(value) + values.index(safe) + rising) // 2]
         if missing := sum(int(one["no_answer"]) for one in shares):
             without = out_of(missing, count * len(shares), "case")
-            said.insert(1, f"Without an answer, and counted as too large a gap: {without} over all values.")
+            said.insert(1, f"Without an answer, and not counted as kept: {without} over all values.")
         outcome = replace(outcome, sentences=tuple(said))
         asked = {"find": find, "allowed_mm": allow_gap_mm, "share": share, "cases": count}
         records.replace_object(directory / TOLERANCE, asked | asdict(outcome))
@@ -222,13 +229,17 @@ def searched(
 ) -> Tolerance:
     """The outcome by bisection. kept : in how many of the `count` cases a value keeps the limit, and may."""
     last, least = len(values) - 1, ceil(share * count - 1e-9)
-    ends = kept(values[0])[0], kept(values[-1])[0]
+    ends, most = zip(kept(values[0]), kept(values[-1]), strict=True)
     rising = ends[0] < least
     if rising == (ends[1] < least):
-        which = "Neither end keeps" if rising else "Both ends keep"
+        unjudged = rising and max(most) >= least
+        which = f"Neither end {'surely ' * unjudged}keeps" if rising else "Both ends keep"
         counts = f"{ends[0]} of {count} cases at {values[0]:g}, {ends[1]} at {values[-1]:g}"
-        said = f"{which} {{limit}}, by {{key}}: {counts}. Name another range."
-        return Tolerance(None, (), not rising, (said,))
+        said = f"{which} {{limit}}, by {{key}}: {counts}."
+        if unjudged:
+            unknown = f"of {most[0] - ends[0]} and {most[1] - ends[1]} cases it is not known"
+            return Tolerance(None, (), None, (f"{said} {UNJUDGED}: {unknown}.",))
+        return Tolerance(None, (), not rising, (f"{said} Name another range.",))
     sure, possible = (
         bisect_left(range(count + 1), True, key=lambda k: share_interval(k, count)[end] >= share)
         for end in (0, 1)

@@ -23,7 +23,7 @@ from harness.series.session import Job, SeriesOptions
 from harness.solving.call_lock import keeps_threads
 from harness.terminal import DONE
 from harness.terminal.console import console_of
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, refuse_text
 from problems.load_cases import LoadCases
 from problems.load_cases.sweep import sweep as swept
 from problems.model.scene import ManufacturedScene
@@ -118,6 +118,7 @@ def run_series(
     ['within', 'within']
     """
     directory, solver = Path(out), options.solver
+    refuse_text("run_series", sweep=sweep)
     refuse_unusable(allow_gap_mm)
     read = load_scene(scene)
     cases = cases if sweep else replace(cases, random=cases.laws(read))
@@ -134,6 +135,8 @@ def run_series(
     ):
         if value != usual and not options.plugin:
             faults.append(Fault(f"--{name}", "limit", value, "with --plugin, whose solver alone is ended"))
+        if not value > 0:
+            faults.append(Fault(f"--{name}", "limit", value, "above 0"))
     (made,) = described([(solver, {})], options.plugin, "--solver", reporter)
     if options.form and options.form not in made.forms:
         faults.append(Fault("--form", "form", options.form, f"{solver} takes {' and '.join(made.forms)}"))

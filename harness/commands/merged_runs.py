@@ -30,6 +30,9 @@ def merge(names: Sequence[str], out: Path) -> Path:
         refuse_unreadable(folder)
         if (folder / SUITE).is_file():
             read_written(folder / SUITE)
+        for file in folder.glob("machine*.json"):
+            if not isinstance(named := records.parsed(file.read_bytes()).get("machine"), str):
+                raise InputError.one(file, "machine", named, "the name of the machine")
     rows = [row | dict.fromkeys(("answer", "log")) for side in sides for row in side.rows]
     (((key, machine), count),) = Counter((row.get("key"), row.get("machine")) for row in rows).most_common(1)
     if count > 1:

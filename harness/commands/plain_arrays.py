@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -108,7 +109,7 @@ def judge(
     Raises
     ------
     InputError
-        If the scene is wrong, or a vector has another length or is not finite.
+        If the scene or the limit is wrong, or a vector has another length or is not finite.
 
     Examples
     --------
@@ -116,6 +117,7 @@ def judge(
     >>> judge(own_matrices([[100.0]], [[1.0]], [50.0], [0.2]), [0.2001]).verdict
     'outside'
     """
+    _refuse_limit("judge", limit_mm)
     scene = load_scene(scene)
     problem = open_problem(scene, chosen_form(scene, FORMS, form).form)
     n, m = problem.prepared.assembly.n, problem.prepared.assembly.m
@@ -233,6 +235,7 @@ def solve_series(
     >>> [f"{result.gap[0]:.3f}" for result in solve_series(scene, cases)]
     ['0.000', '0.100']
     """
+    _refuse_limit("solve_series", limit_mm)
     scene = load_scene(scene)
     name, chosen = solver_named(solver, options)
     taken = form_of(name, chosen.forms, form)
@@ -253,6 +256,11 @@ def solve_series(
         return _results(session, [cases])
     copies = _copies(cases, session.data.assembly)
     return _results(session, _blocks(list(copies) if isinstance(cases, Sequence) else copies, session.block))
+
+
+def _refuse_limit(where: str, limit_mm: float) -> None:
+    if not 0 < limit_mm < inf:
+        raise InputError.one(where, "limit_mm", limit_mm, "must be positive and finite")
 
 
 def _copies(cases: Iterable[LoadCase], assembly: Assembly) -> Iterator[LoadCase]:

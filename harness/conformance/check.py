@@ -12,7 +12,7 @@ import numpy as np
 from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
 from harness.solving.solver_session import SolverSession
 from harness.verification.judge import LIMIT_MM
-from problems.errors import InputError
+from problems.errors import InputError, refuse_text
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
 from problems.reporter import Reporter
@@ -56,6 +56,8 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] = FORMS) -> 
 
     Raises
     ------
+    InputError
+        If `forms` is a text.
     SystemExit
         If the solver ends the process.
 
@@ -70,6 +72,7 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] = FORMS) -> 
     >>> check_solver(ActiveSetNewton, ("dual",))
     []
     """
+    refuse_text("check_solver", forms=forms)
     return first_of_each(findings(solver_factory, forms))
 
 

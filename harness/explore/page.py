@@ -33,7 +33,7 @@ from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
 from problems.scene_files import read_scene, scene_of
-from report.document.numbers import counted, position, upwards
+from report.document.numbers import counted, digits_beside, position, upwards
 from report.document.verdict_colours import FAIL, PASS
 
 VIEWPORT = '<meta name="viewport" content="width=device-width">'
@@ -227,11 +227,13 @@ def outcome(answer: LiveAnswer, places: Matrix, limit_mm: float) -> str:
     untold = e is not None and not abs(gap - limit_mm) > e
     word = "cannot be told" if untold else "PASS" if gap <= limit_mm else "FAIL"
     colour = {"PASS": PASS, "FAIL": FAIL}.get(word, "#666666")
+    digits = max(6, digits_beside(limit_mm, gap))
     above = np.count_nonzero(answer.gap > limit_mm)
     after = f"after {escape(answer.stage)}: " if answer.stage else ""
     return (
-        f'<b style="color:{colour};font-size:130%">{word}</b> {after}largest gap <b id="gap">{gap:.6g}</b> '
-        f"mm at {place}; {above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
+        f'<b style="color:{colour};font-size:130%">{word}</b> {after}largest gap '
+        f'<b id="gap">{gap:.{digits}g}</b> mm at {place}; '
+        f"{above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
         f"{counted(len(answer.settings.places), 'fastener')}, {np.count_nonzero(answer.lam)} closed contacts "
         f"carry {answer.lam.sum():.4g} N. {sure}"
     )

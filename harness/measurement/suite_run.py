@@ -6,6 +6,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
+from itertools import count
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -243,7 +244,8 @@ def record_machine(directory: Path, facts: dict[str, Any]) -> str:
                 file = path
                 break
             if path == file:
-                path.rename(path.with_name(f"machine-{len(list(directory.glob('machine*.json')))}.json"))
+                others = (path.with_name(f"machine-{k}.json") for k in count(1))
+                path.rename(next(other for other in others if not other.exists()))
     records.replace_object(file, facts)
     return str(facts["machine"])
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from math import inf
 from typing import Any
 
 from harness.placement.candidates import Plan
@@ -32,12 +33,13 @@ def record_of(
     scene = study.scene
 
     def entry(step: Step, numbers: Sequence[int] = result.numbers) -> dict[str, Any]:
-        limit = float("inf") if goal.limit_mm is None else goal.limit_mm
+        limit, gaps = inf if goal.limit_mm is None else goal.limit_mm, step.outcome.largest
         return {
             "moved": step.moved,
             "fasteners": len(step.plan),
             "gap_mm": step.gap_mm,
-            "failing": [numbers[k] for k, gap in enumerate(step.outcome.largest) if gap > limit],
+            "failing": [numbers[k] for k, gap in enumerate(gaps) if limit < gap < inf],
+            "unproven": [numbers[k] for k, gap in enumerate(gaps) if not gap < inf],
             "worst_case": numbers[step.worst],
             "worst_at": nodes[step.outcome.contact[step.worst]].tolist(),
             "plan": step.plan,
@@ -87,5 +89,5 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
         words += f"; in {share} it is {rounded_up(step.gap_mm)} mm"
-    more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
+    more = f"{rounded_up(step.gap_mm - goal.limit_mm)} mm more than allowed"
     return f"FAIL: {words}, {more}; case {worst} is the worst, at {at}.", False

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, refuse_text
 from problems.input.bounded_types import resolved, unknown
 from problems.scene_files import read_scene
 from solvers.base import Form
@@ -66,6 +66,10 @@ class Overrides:
     memory_limit_mib: int | None = None
     reference_limit_s: float | None = None
     plugin: str | Path | None = None
+
+    def __post_init__(self) -> None:
+        names = "scenes", "solvers", "requirements", "forms", "options"
+        refuse_text("Overrides", **{name: getattr(self, name) for name in names})
 
 
 def overridden(suite: Suite, change: Overrides) -> Suite:

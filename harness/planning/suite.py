@@ -147,7 +147,7 @@ class Suite(BaseModel):
     threads: Annotated[list[Count], NonEmpty] = [2]
     time_limit_s: Positive = 60.0
     time_limit_by_size_s: dict[PositiveInt, Positive] = {}
-    times_best_form: Annotated[float, Field(ge=1), PLAIN] | None = None
+    times_best_form: Annotated[float, Field(ge=1, allow_inf_nan=False), PLAIN] | None = None
     memory_limit_mib: Count = 8192
     reference_limit_s: Positive | None = None
     limit_mm: Positive = 1e-7

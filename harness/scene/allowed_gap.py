@@ -21,7 +21,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
-from report.document.numbers import counted, position, upwards
+from report.document.numbers import beside, counted, position, upwards
 
 from .mesh_error import MeshError
 from .solution import Solution
@@ -144,16 +144,17 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
             said.append(f"In {some} of {cases} {what}.")
     if exceed:
         kind, worst, often = "fail", result.cases.iloc[0], int(np.argmax(result.shares))
+        most = beside(allowed_mm)(worst["max_gap_mm"])
         contacts = f"{np.count_nonzero(result.shares)} of {counted(len(result.shares), 'contact')}"
         at = "" if series.nodes is None else f", {position(series.nodes[often], series.nodes)}"
         said.append(
             f"FAIL: the gap is larger than {allowed_mm:g} mm in {exceed} of {cases} "
             f"({exceed / count:.1%}), at {contacts}, most often ({result.shares[often]:.1%}) at contact "
-            f"{often}{at}; the largest is {worst['max_gap_mm']:.3g} mm, in case {worst['case']:.0f}."
+            f"{often}{at}; the largest is {most} mm, in case {worst['case']:.0f}."
         )
     elif kind:
-        largest = f"the largest is {series.cases['max_gap_mm'].max():.3g} mm"
-        said.append(f"PASS: in none of {cases} is a gap larger than {allowed_mm:g} mm; {largest}.")
+        most = f"the largest is {beside(allowed_mm)(series.cases['max_gap_mm'].max())} mm"
+        said.append(f"PASS: in none of {cases} is a gap larger than {allowed_mm:g} mm; {most}.")
     check = {"kind": kind, "said": said, "allowed_mm": allowed_mm}
     series_file.add_facts(directory, {CHECK: check})
     return check

@@ -178,7 +178,7 @@ def _stage(stage: StageAnswer) -> dict[str, Any]:
         "name": stage.name,
         "verdict": stage.judgement.verdict,
         "error_bound_mm": stage.error_bound_mm,
-        "closed": int((stage.lam > 0).sum()),
+        "closed": None if np.isnan(stage.lam).any() else int((stage.lam > 0).sum()),
         "forces_N": stage.forces,
         "marks": _marks(stage.scene),
     }

@@ -109,6 +109,12 @@ def export(
     if with_reference and out.suffix in (".mps", ".qps", ".parquet"):
         raise InputError.one("--with-reference", "path", str(out), ".npz or a folder: it holds no answer")
     if form is not None and out.suffix == ".parquet":
+        if not isinstance(scene, str | Path):
+            name, allowed = (
+                load_scene(scene).name,
+                "the name of a suite or its file: a .parquet has its scenes",
+            )
+            raise InputError.one("SUITE", "name", name, allowed)
         return _write_test_set(str(scene), out, form, console_of(reporter))
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     read = load_scene(scene)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, refuse_text
 from problems.forms import Form
 from problems.input.tables import AS_NAMED, TableOptions
 from problems.load_cases import Listed, LoadCases
@@ -79,6 +79,10 @@ class GapCases:
     contributors: int | None = None
     scans: str | Path | None = None
     variance: float | None = None
+
+    def __post_init__(self) -> None:
+        lists = {"random": self.random, "columns": self.options.columns, "missing": self.options.missing}
+        refuse_text("GapCases", **lists)
 
     @property
     def files(self) -> list[str | Path]:

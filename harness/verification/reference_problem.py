@@ -131,6 +131,8 @@ def open_stage(
     form : the form of the answers; in the sparse form, x has an entry per unknown of the model. like : a
     problem in this form whose matrices are taken, with their factors, if they are those of the scene.
     """
+    if limit_s is not None and not limit_s >= 0:
+        raise InputError.one("--reference-limit", "seconds", limit_s, "0 or larger")
     shared = like is not None and adopts_model(scene, like.scene)
     data = like.prepared if like is not None and shared else prepared(scene, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s

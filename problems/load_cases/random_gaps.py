@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, refuse_text
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import validation_faults
@@ -140,6 +140,7 @@ def random_gaps(
     >>> cases.load(0).g.shape
     (738,)
     """
+    refuse_text("random_gaps", columns=options.columns, missing=options.missing)
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):
         allowed = "a random field needs a joint; own matrices take a table of gaps (--gaps)"

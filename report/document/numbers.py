@@ -69,6 +69,16 @@ def without_rounding(least: float, largest: float) -> float:
     return 0.0 if abs(least) <= ROUNDING * abs(largest) else least
 
 
+def digits_beside(limit: float, value: float) -> int:
+    """How many digits show a value on its side of a limit: three, or as many more as it takes."""
+    return next(k for k in range(3, 18) if (float(f"{value:.{k - 1}e}") > limit) == (value > limit))
+
+
+def beside(limit: float) -> Callable[[object], str]:
+    """Shows values with the digits that show them on their sides of a limit."""
+    return lambda value: significant(value, digits_beside(limit, as_number(value) or 0.0))
+
+
 def power(value: object, digits: int = 3) -> str:
     """4.10e-9: always with a power of ten, without leading zeros in it."""
     number = as_number(value)

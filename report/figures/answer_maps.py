@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from report.document.numbers import significant
+from report.document.numbers import beside, significant
 from report.results.answer_record import STRESS, SavedAnswer, pair_name, stages, stress_map, von_mises
 
 from . import style
@@ -115,13 +115,14 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
         larger = [larger_than(allowed["allowed_mm"], values)] if allowed else []
         answer = record | {"marks": stage["marks"]}, arrays
         here = _pairs(stage["name"], answer, values, scale, larger)
-        maps += [replace(item, title=_outcome(line)) for item in here] if len(here) == 1 else here
+        title = _outcome(line, allowed["allowed_mm"] if allowed else 0.0)
+        maps += [replace(item, title=title) for item in here] if len(here) == 1 else here
     return {"history": history, "stage-gaps": map_sheet(maps, 2)[0]}
 
 
-def _outcome(stage: Mapping[Any, Any]) -> str:
+def _outcome(stage: Mapping[Any, Any], limit_mm: float) -> str:
     """A line of the table of stages in words."""
-    words = f"{stage['stage']}: gap {significant(stage['largest_mm'])} mm"
+    words = f"{stage['stage']}: gap {beside(limit_mm)(stage['largest_mm'])} mm"
     words += f", stress {significant(stage[STRESS])} N/mm²" if STRESS in stage else ""
     return words + (f", {stage['verdict']}" if "verdict" in stage else "")
 

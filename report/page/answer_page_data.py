@@ -5,6 +5,7 @@ import pandas as pd
 from report.document.blocks import number, word
 from report.document.numbers import (
     as_number,
+    beside,
     coordinate,
     listed,
     out_of,
@@ -12,6 +13,7 @@ from report.document.numbers import (
     raised,
     significant,
     upwards,
+    whole,
     without_rounding,
 )
 from report.page.contact_maps import answer_maps, map_view, two_answers_maps
@@ -43,6 +45,10 @@ def stage_lines(record: Data, arrays: dict[str, Array]) -> list[list[str]]:
     shown = table.map(
         lambda value: significant(value) if value is None or isinstance(value, float) else str(value)
     )
+    if len(table):
+        allowed = (record.get("allowed_gap") or {}).get("allowed_mm", 0.0)
+        shown["largest_mm"] = table["largest_mm"].map(beside(allowed))
+        shown["closed"] = table["closed"].map(whole)  # no floats beside one that is not known
     heads = [name.replace("_mm", " gap, mm") for name in shown.columns]
     return [heads, *shown.to_numpy().tolist()]
 
@@ -92,8 +98,9 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
     if "contact_nodes" in arrays:
         at = position(arrays["contact_nodes"][worst], arrays["contact_nodes"])
     left = without_rounding(gap[worst], abs(arrays["gap_before"]).max())
-    largest = f"the largest gap left is {significant(left)} mm, at {at} ({pair_name(pair)})"
     check = record.get("allowed_gap")
+    shown = beside(check["allowed_mm"] if check else 0.0)(left)
+    largest = f"the largest gap left is {shown} mm, at {at} ({pair_name(pair)})"
     if check is None:
         return {"kind": "", "text": f"{largest[0].upper()}{largest[1:]}."}
     limit = f"limit {check['allowed_mm']:g} mm"

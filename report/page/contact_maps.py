@@ -40,7 +40,7 @@ def scene_maps(results: Results) -> Data:
         elif arrays:
             fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
             marks = arrays.get("fasteners", NO_MARKS)
-            if not _add_map(page, scene, arrays["contact_nodes"], fields, marks, BUDGET):
+            if not _add_map(page, scene, arrays["contact_nodes"], fields, marks, budget=BUDGET):
                 page["left_out"].append(scene)
     if page["left_out"]:
         for made in page["maps"]:
@@ -54,21 +54,16 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     """
     fields = {text: arrays[name] for name, text in FIELDS.items()}
     gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
-    page = _pairs(record, fields | {f"gap of {stage['name']}": gap for stage, gap in gaps}, arrays)
+    check, stress = record.get("allowed_gap") or {}, record.get("stress") or {}
+    fields |= {f"gap of {stage['name']}": gap for stage, gap in gaps}
+    page = _pairs(record, fields, arrays, check.get("allowed_mm"))
     for k, part in enumerate(record["parts"] if "stress" in arrays else ()):
         places, highest, unread = stress_map(arrays, k)
         values, name = np.where(unread, np.nan, highest), f"stress of {part['name']}"
         if len(places):
-            _add_map(page, name, places, {STRESS: values}, _marked(record), noun="place")
-    check, stress = record.get("allowed_gap") or {}, record.get("stress") or {}
-    return _limited(page, check.get("allowed_mm"), stress.get("allowed"))
-
-
-def _limited(page: Data, gap_mm: float | None, stress: float | None = None) -> Data:
-    """The page with the limits of its fields: above them contacts are outlined."""
-    for field in (field for made in page["maps"] for field in made["fields"].values()):
-        if field["kind"] == "gap":
-            field["limit"] = gap_mm if field["unit"] == "mm" else stress
+            _add_map(
+                page, name, places, {STRESS: values}, _marked(record), stress.get("allowed"), noun="place"
+            )
     return page
 
 
@@ -84,13 +79,15 @@ def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
     return page
 
 
-def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array]) -> Data:
+def _pairs(
+    record: Data, fields: dict[str, Array], arrays: dict[str, Array], limit: float | None = None
+) -> Data:
     page = _empty()
     marks = _marked(record)
     for pair in record["pairs"] if "contact_nodes" in arrays else ():
         contacts = slice(pair["start"], pair["stop"])
         of_pair = {name: values[contacts] for name, values in fields.items()}
-        _add_map(page, pair_name(pair), arrays["contact_nodes"][contacts], of_pair, marks)
+        _add_map(page, pair_name(pair), arrays["contact_nodes"][contacts], of_pair, marks, limit)
     return page
 
 
@@ -110,12 +107,14 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     step = _step(len(series.nodes))
     curves = _exceeded(series, step)
     maps = dict(zip(names, quantiles, strict=True))
-    _add_map(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners)
+    limit = (series.facts.get("allowed_gap") or {}).get("allowed_mm")
+    _add_map(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners, limit)
     (made,) = page["maps"]
     worst, *others = _chosen(series)
     spent, cases = _size(made["fields"]) + len(curves), {}
     for case in (worst, *others):
-        field = _field("gap", np.asarray(series.gaps[case, ::step], dtype=float)) | {"hover": False}
+        gaps = np.asarray(series.gaps[case, ::step], dtype=float)
+        field = _field("gap", gaps, limit) | {"hover": False}
         spent += len(field["values"])
         if spent > BUDGET:
             break
@@ -124,7 +123,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
         made["fields"][f"case {case}{', the worst' if case == worst else ''}"] = field
     made["about"] += " A click on a contact shows how often its gap is exceeded."
     made |= {"shares": [100 * share for share in SHARES], "exceeded": curves}
-    return _limited(page, (series.facts.get("allowed_gap") or {}).get("allowed_mm"))
+    return page
 
 
 def _chosen(series: Series) -> Iterator[int]:
@@ -181,13 +180,14 @@ def _add_map(
     nodes: Array,
     fields: dict[str, Array],
     marks: Array,
+    limit: float | None = None,
     budget: float = np.inf,
     noun: str = "contact",
 ) -> bool:
     """Add a map to the page if it fits into the budget; returns whether it did."""
     step = _step(len(nodes))
     place = {side: exact(values) for side, values in _cells(nodes[::step]).items()}
-    made = {text: _field(text, values[::step]) for text, values in fields.items()}
+    made = {text: _field(text, values[::step], limit) for text, values in fields.items()}
     groups = page["groups"]
     spent = sum(len(text) for group in groups for text in group.values()) + sum(
         _size(other["fields"]) for other in page["maps"]
@@ -225,20 +225,22 @@ def _frame(nodes: Array) -> Data:
     }
 
 
-def _field(name: str, values: Array) -> Data:
+def _field(name: str, values: Array, limit: float | None) -> Data:
     """A field with the range of its colours: gaps from the least, at most 0, forces from 1/10 000 of the
-    most.
+    most. limit : of a gap or a stress, above which contacts are outlined.
     """
     high = float(np.nanmax(values, initial=0.0)) or 1.0
     values = np.where(abs(values) <= ROUNDING * high, 0.0, values)
     force = name == FIELDS["lam"]
+    limit = None if force else limit
     return {
         "kind": "force" if force else "gap",
         "unit": "N" if force else "N/mm²" if name == STRESS else "mm",
         "low": 1e-4 * high if force else float(np.nanmin(values, initial=0.0)),
         "high": high,
         "hover": True,
-        "values": packed(values),
+        "limit": limit,
+        "values": packed(values, np.inf if limit is None else limit),
     }
 
 

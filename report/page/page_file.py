@@ -105,11 +105,18 @@ def column(values: pd.Series[Any]) -> list[Any] | Data:
     return {"distinct": list(distinct), "places": [distinct[text] for text in texts]}
 
 
-def packed(values: Array) -> str:
-    """An array for a map, of about four digits: base64 of deflated little-endian float32."""
+def packed(values: Array, limit: float = np.inf) -> str:
+    """An array for a map, of about four digits, each on its side of a limit: base64 of deflated little-endian
+    float32.
+    """
     bits = values.astype("<f4").view("<u4")
     rounded = (bits + DIGITS // 2) & ~np.uint32(DIGITS - 1)
-    return exact(np.where(np.isfinite(values), rounded, bits).astype("<u4").view("<f4"))
+    shown = np.where(np.isfinite(values), rounded, bits).astype("<u4").view("<f4")
+    with np.errstate(over="ignore"):  # of a limit beyond all float32
+        nearest = np.float32(limit)
+        most = nearest if float(nearest) <= limit else np.nextafter(nearest, np.float32(-np.inf))
+        least = np.nextafter(most, np.float32(np.inf))  # above the limit
+    return exact(np.where(values > limit, np.maximum(shown, least), np.minimum(shown, most)))
 
 
 def exact(values: Array) -> str:

@@ -31,6 +31,12 @@ function number(value, digits = 3) {
   return rounded && Math.abs(rounded) < 1e-3 ? rounded.toExponential() : String(rounded);
 }
 
+// A bound rounded upwards to three digits.
+function raised(bound) {
+  const [digits, power] = (bound ?? NaN).toExponential(2).split("e"), nearest = Number(`${digits}e${power}`);
+  return nearest < bound ? Number(`${(Number(digits) + 0.01).toFixed(2)}e${power}`) : nearest;
+}
+
 // A table that its headings sort. columns: heading, value of a line, and its cell unless that is the value.
 function tableOf(columns, lines, kind = "") {
   const named = k => `${at("view")} ${k}`, turn = at("down") ? -1 : 1;

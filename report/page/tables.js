@@ -51,7 +51,8 @@ function oneSolver() {
   const ofScenes = Map.groupBy(cells, cell => cell.scene), wrong = cell => cell.judged !== "within";
   const missed = DATA.scenes.filter(({ladder, scene}) => ladder && ofScenes.get(scene)?.every(wrong));
   const breaks = missed.filter(({ladder}, k) => ladder !== missed[k - 1]?.ladder).map(({heading}) => heading);
-  const columns = DATA.columns.map(([column, text]) => [text, cell => cell[column]]);
+  const bound = column => column === "bound_mm" && (cell => el("td", {}, number(raised(cell[column]))));
+  const columns = DATA.columns.map(([column, text]) => [text, cell => cell[column], bound(column)]);
   columns.splice(1, 0, ["verdict", cell => cell.judged, cell => cellOf(cell, words(cell.judged))]);
   box.replaceChildren(el("h2", {}, swatch(name), name), tableOf(columns, cells),
     el("p", {id: "breaks"}, breaks.length ? `Breaks at ${breaks.join(", ")}.` : ""));

@@ -96,7 +96,8 @@ ROUNDING = 1e-9  # of the largest force: a smaller one is rounding
 def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
     """One line per stage: its largest gap, closed contacts, forces by the name of their effect, and verdict.
 
-    Forces of what does not act are missing; there is a verdict only if there is a limit.
+    Forces of what does not act, or that are not known, are missing; there is a verdict only if there is a
+    limit.
     """
     told, lines = record.get("stages", []), []
     for stage, gap in zip(told, arrays.get("stage_gaps", ()), strict=True):
@@ -107,9 +108,11 @@ def stages(record: dict[str, Any], arrays: dict[str, Array]) -> pd.DataFrame:
         }
         if len(gap) and "contact_nodes" in arrays:
             line["at"] = position(arrays["contact_nodes"][gap.argmax()], arrays["contact_nodes"])
-        forces = {f"{name}, N": force for name, force in stage["forces_N"].items()}
-        least = ROUNDING * max(map(abs, forces.values()))
-        forces = {name: force if abs(force) > least else 0.0 for name, force in forces.items()}
+        forces = {
+            f"{name}, N": np.nan if force is None else force for name, force in stage["forces_N"].items()
+        }
+        least = ROUNDING * float(np.nanmax([0.0, *map(abs, forces.values())]))
+        forces = {name: 0.0 if abs(force) <= least else force for name, force in forces.items()}
         if "largest_stress" in stage:
             line[STRESS] = stage["largest_stress"]
         verdict = {"verdict": EXCEEDED[stage["exceeded"]]} if "exceeded" in stage else {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pandas as pd
+from packaging.version import InvalidVersion, Version
 
 from report.analysis.checks import asked_for
 from report.analysis.comparison import MISSING, WORSE, compared
@@ -79,7 +80,7 @@ def of_versions(results: Results) -> dict[str, pd.DataFrame]:
 
 
 def _side_by_side(rows: pd.DataFrame) -> pd.DataFrame:
-    (_, older), *later = sorted(rows.groupby("solver_version"), key=lambda pair: _numbers(str(pair[0])))
+    (_, older), *later = sorted(rows.groupby("solver_version"), key=lambda pair: _versions(str(pair[0])))
     parts = [cells_of(older, ["measurement"])]
     for _, newer in later:
         change = compared(older, newer, True, MAX_DIGITS_LOST, MAX_SLOWDOWN).set_index("measurement")
@@ -107,6 +108,14 @@ def _what(rows: pd.DataFrame) -> pd.Series[str]:
     return words + (" × " + rows["threads_asked"].map("{:.0f}".format)).where(several["threads_asked"], "")
 
 
-def _numbers(version: str) -> list[int]:
-    """The numbers of a version, or of "NAME==VERSION"."""
-    return [int(digits) for digits in re.findall(r"\d+", re.sub(r"\S*==", "", version))]
+def _versions(text: str) -> list[Version]:
+    """The versions in a text, by which it is sorted: of "VERSION", or of each "NAME==VERSION" in it."""
+    return [_version(word.rpartition("==")[2]) for word in text.split()]
+
+
+def _version(word: str) -> Version:
+    """The version that a word is, or has in its numbers."""
+    try:
+        return Version(word)
+    except InvalidVersion:
+        return Version(".".join(re.findall(r"\d+", word)) or "0")

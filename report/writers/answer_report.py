@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
-from report.document.numbers import extent, raised, significant, whole
+from report.document.numbers import beside, extent, raised, significant, whole
 from report.figures.answer_maps import answer_figures
 from report.figures.node_cells import grid_of
 from report.page.answer_page_data import FASTENER, FORCE, answer_data, facts, headline
@@ -149,7 +149,8 @@ def _stages(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
     if "stages" not in record:
         return []
     table = stages(record, arrays)
-    columns = [word("stage", "stage"), number("largest gap, mm", "largest_mm"), word("at", "at")]
+    shown = beside((record.get("allowed_gap") or {}).get("allowed_mm", 0.0))
+    columns = [word("stage", "stage"), number("largest gap, mm", "largest_mm", shown), word("at", "at")]
     columns += [number("closed", "closed", whole)]
     columns += [number(name, name) for name in table.columns if name.endswith(", N")]
     columns += [word("verdict", "verdict")] if "verdict" in table else []
@@ -174,7 +175,7 @@ def write_vtu(
     since meshio is optional. grid : makes points, cells and point data; by default of those nodes.
 
     Point data: displacement (0, 0, x) in mm, to warp by; part; Aλ, the force with which the node pushes on
-    what it touches, N; the smallest gap before and after at its contacts, mm, NaN if it has none.
+    what it touches, N; the smallest gap before and after at its contacts, mm. NaN: not known, or no contact.
     """
     try:
         import meshio
@@ -201,7 +202,7 @@ def grid_with_fields(record: dict[str, Any], arrays: dict[str, Any]) -> MeshData
     nodes, n = arrays["nodes"], len(arrays["nodes"])
     force, initial, remaining = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)
     columns = np.repeat(np.arange(record["m"]), np.diff(arrays["A_indptr"]))
-    np.add.at(force, arrays["A_indices"], arrays["A_data"] * np.nan_to_num(arrays["lam"])[columns])
+    np.add.at(force, arrays["A_indices"], arrays["A_data"] * arrays["lam"][columns])
     np.fmin.at(initial, arrays["A_indices"], arrays["gap_before"][columns])
     np.fmin.at(remaining, arrays["A_indices"], arrays["gap_after"][columns])
     part = np.concatenate([np.full(p["stop"] - p["start"], k) for k, p in enumerate(record["parts"])])

@@ -18,7 +18,7 @@ from report.results.series_results import read as read_series
 from report.writers.sections_writer import emptied, written
 from report.writers.sheet import MESH, Sheet, exactness, origin, write_sheet
 
-FEW = 10  # failing cases that are named
+FEW = 10  # cases that are named
 #: How a plan came about: its name in the table and the picture, and its look.
 FAMILIES = {
     "all candidates": ("all candidates", style.BLACK, "o", ""),
@@ -70,16 +70,14 @@ def _summary(record: dict[str, Any]) -> Table:
         "found": record["said"],
     }
     for n, sample in enumerate(record["samples"], start=1):
-        failing, (low, high) = sample["failing"], (f"{100 * value:.4g}" for value in sample["interval"])
+        low, high = (f"{100 * value:.4g}" for value in sample["interval"])
         said = f"{counted(sample['fasteners'], 'fastener')}: kept by {sample['kept']}, with "
         said += f"{100 * record['confidence']:g} % confidence {low} to {high} % of all"
-        some = ", ".join(map(str, failing[:FEW])) + (", …" if len(failing) > FEW else "")
-        which = (
-            f"; beyond the limit in {out_of(len(failing), sample['cases'], 'case')}: {some}"
-            if failing
-            else ""
-        )
-        facts[f"{counted(sample['cases'], 'fresh case')}, round {n}"] = said + which
+        for what, numbers in (("beyond the limit", sample["failing"]), ("not proven", sample["unproven"])):
+            if numbers:
+                some = ", ".join(map(str, numbers[:FEW])) + (", …" if len(numbers) > FEW else "")
+                said += f"; {what} in {out_of(len(numbers), sample['cases'], 'case')}: {some}"
+        facts[f"{counted(sample['cases'], 'fresh case')}, round {n}"] = said
     if best is not None:
         facts["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
         facts["lower bound"] = "none is known: this is the best plan found"
@@ -128,7 +126,9 @@ def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
     drawing.legend(loc="outside right upper")
     share = f"{100 * record['chosen_by_share']:.4g} % of the {counted(record['cases'], 'case')}"
     caption = f"*The gap against the number of fasteners*: the largest in {share} that chose, proven."
-    return Figure("gap-against-fasteners", caption, drawing, steps.drop(columns=["plan", "failing"]))
+    return Figure(
+        "gap-against-fasteners", caption, drawing, steps.drop(columns=["plan", "failing", "unproven"])
+    )
 
 
 def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
@@ -179,7 +179,7 @@ def _order(record: dict[str, Any]) -> list[Block]:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     columns = [number("set", "set", whole), *([word("hole", "name")] if labels else [])]
     columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
-    columns.append(number("gap after it, mm", "gap_mm"))
+    columns.append(number("gap after it, mm", "gap_mm", lambda gap: significant(raised(gap))))
     caption = "*The order that keeps the gap small*: the reverse of removing what is needed least."
     return [
         Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 from report.analysis.checks import code_warnings
 from report.document.blocks import Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import file_name
-from report.document.numbers import counted, out_of, raised, significant, tidy_power
+from report.document.numbers import beside, counted, out_of, raised, significant, tidy_power
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.page.contact_maps import map_view, series_maps
@@ -85,7 +85,8 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
 def _largest(series: Series) -> str:
     largest = series.cases["max_gap_mm"]
     worst = int(series.cases["case"].to_numpy()[largest.to_numpy().argmax()])
-    return f"{significant(largest.max())} mm, in case {worst}"
+    limit = (series.facts.get("allowed_gap") or {}).get("allowed_mm", 0.0)
+    return f"{beside(limit)(largest.max())} mm, in case {worst}"
 
 
 def _summary(series: Series) -> Table:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 import pandas as pd
+from scipy.stats import spearmanr
 
 from report.analysis.standings import geometric_mean
 from report.analysis.time_to_solution import Exponent
@@ -88,9 +89,10 @@ def trend(method: str, sign: int) -> Callable[[Study], Evidence]:
 
     def evidence(study: Study) -> Evidence:
         for n in study.sizes:
-            seconds = [row["at_least"] for row in _timed(study, method, n)]
-            if len(seconds) >= FEWEST:
-                rho = float(np.corrcoef(np.arange(len(seconds)), np.argsort(np.argsort(seconds)))[0, 1])
+            rows = _timed(study, method, n)
+            active, seconds = ([row[name] for row in rows] for name in ("active", "at_least"))
+            if len(rows) >= FEWEST and min(len({*active}), len({*seconds})) > 1:
+                rho = float(spearmanr(active, seconds).statistic)
                 yield f"n = {n}", sign * rho >= CLEAR, f"{rho:+.2f}"
 
     return evidence

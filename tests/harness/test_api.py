@@ -34,6 +34,7 @@ from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms.prepared import Prepared
+from problems.input.tables import TableOptions
 from problems.model.joint import Joint
 from problems.model.joint_model import JointModel
 from solvers.base import failed
@@ -214,6 +215,36 @@ def test_a_solver_object_is_judged_and_its_nonsense_named() -> None:
         solve(scene, Idle(), options={"lam": None})
     with pytest.raises(InputError, match=r"an object of it: Idle\(\)"):
         solve(scene, Idle)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("options", [{"time_limit_s": np.nan}, {"memory_limit_mib": 0}])
+def test_a_series_from_python_has_limits_that_stop(tmp_path: Path, options: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"limit = (nan|0): above 0"):
+        harness.run_series(write_strip(tmp_path), tmp_path / "out", options=harness.SeriesOptions(**options))
+
+
+def test_limits_that_are_no_numbers_are_refused_from_python() -> None:
+    scene = own_matrices(*matrices()[2])
+    for refused in (
+        lambda: solve(scene, limit_s=np.nan),
+        lambda: judge(scene, np.zeros(14), limit_mm=np.nan),
+        lambda: solve_series(scene, [], limit_mm=np.nan),
+    ):
+        with pytest.raises(InputError, match="nan"):
+            refused()
+
+
+def test_a_text_is_no_list(tmp_path: Path) -> None:
+    """Its letters would be read as entries."""
+    for refused, name in (
+        (lambda: GapCases(random="fasteners.preload=normal(1000, 100)"), "random"),  # type: ignore[arg-type]
+        (lambda: GapCases(options=TableOptions(missing="9999")), "missing"),  # type: ignore[arg-type]
+        (lambda: harness.Overrides(scenes="gallery/*"), "scenes"),  # type: ignore[arg-type]
+        (lambda: harness.check_solver(Idle, "dual"), "forms"),  # type: ignore[arg-type]
+        (lambda: harness.run_series(STRIP, tmp_path / "out", sweep="fasteners.preload=1"), "sweep"),
+    ):
+        with pytest.raises(InputError, match=f"{name} = .*: a list of texts, not one text"):
+            refused()
 
 
 def test_an_answer_that_is_changed_leaves_the_reference() -> None:

@@ -222,3 +222,14 @@ def test_a_damaged_machine_file_is_written_anew(content: bytes, tmp_path: Path) 
     (tmp_path / "machine.json").write_bytes(content)
     assert record_machine(tmp_path, {"machine": "mine", "cores": 2}) == "mine"
     assert json.loads((tmp_path / "machine.json").read_text()) == {"machine": "mine", "cores": 2}
+
+
+def test_a_machine_takes_the_file_of_no_other(tmp_path: Path) -> None:
+    """Also after a file was deleted, whose number is free."""
+    for name in ("a", "b", "c"):
+        record_machine(tmp_path, {"machine": name})
+    (tmp_path / "machine-1.json").unlink()
+    record_machine(tmp_path, {"machine": "d"})
+    record_machine(tmp_path, {"machine": "e"})
+    names = {json.loads(path.read_text())["machine"] for path in tmp_path.glob("machine*.json")}
+    assert names == {"b", "c", "d", "e"}

@@ -16,8 +16,9 @@ from commands import harness
 from small_problems import solve_by_nnls
 from strip_scene import write_strip
 
-from harness import solve
+from harness import export, solve
 from problems.build import load_case, prepared
+from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.problem import in_form
 from problems.scene_files import read_scene
@@ -366,6 +367,12 @@ def test_a_suite_is_a_test_set(scenes: Path, tmp_path: Path) -> None:
         n = len(line["q"])
         assert np.array_equal(line["P"].reshape(-1, n), dense(sp.block_diag(problem.blocks)))
         assert np.array_equal(line["G"].reshape(-1, n), dense(problem.G))
+
+
+def test_a_scene_is_no_test_set(scenes: Path, tmp_path: Path) -> None:
+    scene = read_scene(str(scenes / "strip.toml"))
+    with pytest.raises(InputError, match=r"^SUITE: name = 'strip': the name of a suite"):
+        export(scene, tmp_path / "strip.parquet", form="dual")
 
 
 def test_two_programs_of_one_name_are_no_test_set(tmp_path: Path) -> None:

@@ -121,6 +121,13 @@ def test_a_damaged_file_is_named_before_anything_is_written(
     assert str(both[1] / name) in done.output
 
 
+def test_a_machine_without_a_name_is_refused(both: tuple[Path, Path], tmp_path: Path) -> None:
+    (both[1] / "machine.json").write_text("{}")
+    done = harness("merge", *both, "--out", tmp_path / "out")
+    assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
+    assert f"{both[1] / 'machine.json'}: machine = None" in done.output
+
+
 def test_runs_that_do_not_belong_together_are_refused(both: tuple[Path, Path], tmp_path: Path) -> None:
     fast, slow = both
     out = tmp_path / "both"

@@ -25,8 +25,10 @@ from harness import place as place_fasteners
 from harness.placement import search as search_module
 from harness.placement.answer_journal import AnswerJournal
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, uniform_plans
-from harness.placement.fresh_cases import Cases, Goal, Sample, search_in_rounds
+from harness.placement.fresh_cases import Cases, Goal, Sample, SearchOutcome, search_in_rounds
+from harness.placement.plan_search import Step
 from harness.placement.search import Search
+from harness.placement.search_record import record_of
 from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question, answer
 from harness.planning.form_choice import Choice
 from harness.results import series_file
@@ -260,6 +262,15 @@ def test_a_case_of_which_nothing_is_proven_neither_keeps_the_limit_nor_fails(str
     sample = Sample.of((), search, Goal(0.5, 0.5), Cases(range(20), 20), slice(0, 20), 0.05)
     assert sample.kept == 18
     assert sample.interval == pytest.approx((interval_of(18, 20)[0], interval_of(19, 20)[1]))
+
+
+def test_a_record_tells_cases_beyond_the_limit_from_those_not_proven(strip: Path) -> None:
+    study, holes = study_of(strip), plans_of(strip, 1, 4)
+    outcome = Outcome((np.inf, 1.0, 0.1), (2, 2, 2), (0.1, 0.1, 0.1))
+    step = Step(holes, 1.0, outcome)
+    found = SearchOutcome([step], range(3), step, [], [])
+    best = record_of(study, (), holes, Goal(0.5, 1.0), found, np.zeros((3, 2)))["best"]
+    assert (best["failing"], best["unproven"]) == ([1], [0])
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])

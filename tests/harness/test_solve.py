@@ -242,6 +242,14 @@ def test_the_forces_on_the_nodes_are_A_lambda() -> None:
     assert grid_with_fields(record, given)[2]["contact_force_N"].tolist() == [2.5, -3.75, 0.0]
 
 
+def test_forces_on_nodes_that_are_not_known_are_no_zeros() -> None:
+    record = {"n": 2, "m": 1, "parts": [{"start": 0, "stop": 2}]}
+    data = {"A_data": [1.0], "A_indices": [0], "A_indptr": [0, 1], "lam": [np.nan]}
+    data |= {"nodes": np.zeros((2, 2)), "x": np.zeros(2), "gap_before": [1.0], "gap_after": [0.0]}
+    given = {name: np.array(values) for name, values in data.items()}
+    assert np.isnan(grid_with_fields(record, given)[2]["contact_force_N"]).tolist() == [True, False]
+
+
 def test_without_meshio_the_page_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "meshio", None)
     run(tmp_path)

@@ -17,7 +17,7 @@ from small_joints import two_parts
 from harness.measurement.worker import load_cases, scene_to_measure
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from harness.scene.answer_record import bound_shown
+from harness.scene.answer_record import arrays_of, bound_shown, recorded
 from harness.scene.mesh_error import on_mesh
 from harness.scene.solution import Solution, solve
 from harness.scene.solve import solve_into
@@ -30,6 +30,7 @@ from problems.forms import Form
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
+from report.page.answer_page_data import stage_lines
 from report.writers import sheet
 from rivetbench import export, judge, stresses, validate
 
@@ -141,6 +142,17 @@ def test_export_is_the_last_stage(staged: Path, answer: Solution, tmp_path: Path
     again = solve(str(files))
     assert abs(again.x - answer.x).max() <= 1e-10
     assert validate(staged) is not None
+
+
+def test_contacts_of_unknown_forces_are_not_counted(answer: Solution) -> None:
+    first, *others = answer.stages
+    unknown = replace(first, lam=np.full_like(first.lam, np.nan))
+    record, arrays = recorded(replace(answer, stages=(unknown, *others)), set(), None), arrays_of(answer)
+    assert record["stages"][0]["closed"] is None
+    heads, *lines = stage_lines(record, arrays)
+    closed = [str((stage.lam > 0).sum()) for stage in others]
+    assert [line[heads.index("closed")] for line in lines] == ["–", *closed]
+    assert lines[0][heads.index("contacts, N")] == "–"
 
 
 @pytest.mark.usefixtures("blank_pictures")

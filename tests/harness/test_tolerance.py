@@ -210,11 +210,46 @@ def test_cases_without_an_answer_are_counted(monkeypatch: pytest.MonkeyPatch, tm
     found = tolerance(write_strip(tmp_path), tmp_path / "out", *asked, reporter=onto(said))
     assert f"{SD} = 0.1: within 1 mm in 9 of 10 cases, 1 without an answer." in said.getvalue()
     assert found.value == 0.1
-    assert (
-        found.sentences[1]
-        == "Without an answer, and counted as too large a gap: 4 of 40 cases over all values."
-    )
+    assert found.sentences[1] == "Without an answer, and not counted as kept: 4 of 40 cases over all values."
     table = pd.read_csv(tmp_path / "out/shares.csv")
     assert table["no_answer"].tolist() == [1] * 4
     low, high = table.loc[table["kept"] == 9, ["low", "high"]].to_numpy().T
     np.testing.assert_allclose((low, high), (low * 0 + interval_of(9, 10)[0], low * 0 + 1.0), rtol=1e-9)
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_without_answers_at_both_ends_nothing_is_judged(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The key is not to blame."""
+    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
+    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": 2})
+    monkeypatch.setattr(series_file, "rows", lambda _: [{"case": 0}, {"case": 1}])
+    words = "--key", SD, "--range", "0.1:0.2", "--allow-gap", 1.0, "--cases", 2
+    done = harness("tolerance", write_strip(tmp_path), *words, "--out", tmp_path / "out")
+    assert done.exit_code == 3
+    assert "cannot be judged: of 2 and 2 cases it is not known" in " ".join(done.output.split())
+
+
+@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.parametrize(("kept", "passed"), [(6, True), (4, None)])
+def test_fresh_cases_that_are_not_known_decide_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kept: int, passed: bool | None
+) -> None:
+    """Of 20 fresh cases 6 are known to keep it, or 4 with the rest unknown: 6 reach a share of a half."""
+    assert share_interval(6, 20)[1] >= 0.5 > share_interval(4, 20)[1]
+
+    def rows(folder: Path) -> list[dict[str, float]]:
+        if not folder.name.endswith("-fresh"):
+            gap = float(folder.name)
+            return [{"case": k, "max_gap_mm": gap, "gap_error_mm": 0.0} for k in range(20)]
+        return [
+            {"case": k, "max_gap_mm": 0.1} | ({"gap_error_mm": 0.0} if k < kept else {}) for k in range(20)
+        ]
+
+    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
+    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": 20})
+    monkeypatch.setattr(series_file, "rows", rows)
+    found = tolerance(write_strip(tmp_path), tmp_path / "out", f"{SD}=0.1:0.5", 0.3, 0.5, 0.5)
+    assert (found.value, found.passed) == (0.3, passed)
+    assert ("cannot be judged" in found.sentences[-1]) == (passed is None)

@@ -143,6 +143,15 @@ def test_an_array_keeps_four_digits_and_what_is_not_finite() -> None:
     np.testing.assert_allclose(found, values, rtol=2.0**-12)
 
 
+def test_what_is_above_a_limit_stays_above_it() -> None:
+    """An outline is that of the verdict, however close a gap is to the limit."""
+    for limit in (0.05, 0.1, 0.0):
+        values = limit * (1 + np.array([-1e-4, -1e-12, 0.0, 1e-12, 1e-4]))
+        shown = unpacked(packed(values, limit)).astype(float)
+        np.testing.assert_array_equal(shown > limit, values > limit)
+    np.testing.assert_allclose(unpacked(packed(np.array([0.04, 0.06]), 0.05)), [0.04, 0.06], rtol=2.0**-12)
+
+
 def test_an_answer_outside_its_own_limit_has_seconds_from_the_scene(tmp_path: Path) -> None:
     """The page may judge it by a looser limit."""
     wrong = {"displacement_error_mm": 5e-7, "verdict": "outside"}

@@ -11,7 +11,16 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from report.document.blocks import Table, number, word
-from report.document.numbers import coordinate, extent, position, raised, rounded_up, significant, upwards
+from report.document.numbers import (
+    beside,
+    coordinate,
+    extent,
+    position,
+    raised,
+    rounded_up,
+    significant,
+    upwards,
+)
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.page.answer_page_data import headline
@@ -195,6 +204,11 @@ def test_no_bound_is_rounded_down_or_far() -> None:
         assert bound <= float(rounded_up(bound)) <= bound * 1.01001
     assert exactness(1.241e-3) == "The calculation is exact to 0.0013 mm for this model."
     assert (raised(None), raised(np.inf), rounded_up(np.inf)) == (None, None, "inf")
+
+
+def test_a_value_is_shown_on_its_side_of_a_limit() -> None:
+    said = [beside(0.05)(value) for value in (0.0512, 0.05004, 0.05, 0.04999)]
+    assert said == ["0.0512", "0.05004", "0.0500", "0.0500"]
 
 
 def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pandas as pd
@@ -33,6 +34,7 @@ from studies.paper import claims, table3, tables
 from studies.paper.claims import EVIDENCE
 from studies.paper.figures5_7 import crossings
 from studies.paper.rows import Study
+from studies.paper.two_methods import trend
 
 
 def words(rows: Rows, *names: str) -> dict[str, str]:
@@ -251,3 +253,10 @@ def test_rows_are_found_by_what_was_run_not_by_its_name(tmp_path: Path) -> None:
     named = paper_rows()
     renamed = changed(named, lambda r: r["solver"] == "ipm", variant=lambda r: f"{r['variant']}?")
     assert page(tmp_path / "a", named) == page(tmp_path / "b", renamed)
+
+
+def test_times_that_are_equal_have_one_rank() -> None:
+    """Runs that the time limit ended do not say which of them takes longer."""
+    rows = {f"{k}": {"active": k, "at_least": min(k, 3.0)} for k in range(1, 7)}
+    study: Any = SimpleNamespace(sizes=[9], of=lambda method, n: rows)
+    assert list(trend("GI primal", 1)(study)) == [("n = 9", True, "+0.85")]

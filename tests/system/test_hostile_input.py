@@ -73,6 +73,8 @@ NOT_ASKED_FOR = "--solver: name = 'newton': mine, that of --plugin"
         *((f"series SCENE --tolerance {value}", POSITIVE) for value in ("inf", "nan", "-1", "0")),
         ("series SCENE --limit nan", POSITIVE),
         ("solve SCENE --tolerance nan", POSITIVE),
+        ("check --time-limit nan", "nan is no number"),
+        ("solve SCENE --reference-limit nan", "nan is no number"),
         ("series SCENE --cases 1000000000000", "--cases"),
         ("solve SCENE --tolerance 1e-6", "--tolerance: tolerance = 1e-06: needs --solver"),
         ("export SCENE --form dual --reference-limit 5", "--reference-limit: seconds = 5.0: needs"),
@@ -100,7 +102,12 @@ def test_an_option_that_is_not_bounded_or_without_effect_is_refused(
 @pytest.mark.parametrize(
     ("line", "of_solver"),
     [
-        *(("limit_mm = inf", ""), ("tolerances = [nan]", ""), ("repeats = 100000000000", "")),
+        *(
+            ("times_best_form = nan", ""),
+            ("limit_mm = inf", ""),
+            ("tolerances = [nan]", ""),
+            ("repeats = 100000000000", ""),
+        ),
         *(("time_limit_s = inf", ""), ('name = "../../x"', ""), ('name = "a\\u0000b"', "")),
         *(("", 'variant = "a\\u0000"'), ("", "options = { nested = 2020-01-01 }")),
         ('scenes = ["a\\u0000b.toml"]', ""),

@@ -172,6 +172,12 @@ def test_the_limit_of_the_rows_is_that_of_the_page_with_all_its_digits(chromium:
         assert chromium.execute_script("return filtered().map(cell => cell.judged)") == [verdict]
 
 
+def test_bounds_are_rounded_upwards(chromium: Any, tmp_path: Path) -> None:
+    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, [row()]))))
+    script = "return [3.201e-16, 3.2e-16, 9.999e-9, null].map(bound => number(raised(bound)))"
+    assert chromium.execute_script(script) == ["3.21e-16", "3.2e-16", "1e-8", "–"]
+
+
 def test_an_answer_without_seconds_is_within_the_limit_all_the_same(chromium: Any, tmp_path: Path) -> None:
     rows = [row(setup_s=0.0, solve_s=0.0, form_s=0.0), row(solver="gi")]
     rows.append(row(solver="gi", scene="4386/1074", verdict="outside", displacement_error_mm=1e-6))
