@@ -12,7 +12,7 @@ from harness.placement.session import FastenerStudy
 from harness.results.provenance import stamp
 from problems.forms.assembly import Matrix
 from problems.storage import digest
-from report.document.numbers import counted, position, rounded_up
+from report.document.numbers import counted, on_its_side, position
 
 
 def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
@@ -79,7 +79,8 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     else:
         leave = "leaves" if len(step.plan) == 1 else "leave"
         fasteners = f"{which}{counted(len(step.plan), 'fastener')}"
-        words = f"{fasteners} {leave} {rounded_up(step.gap_mm)} mm in the one load case"
+        most = on_its_side(step.gap_mm, goal.limit_mm or 0.0)
+        words = f"{fasteners} {leave} {most} mm in the one load case"
     if goal.limit_mm is None:
         return f"{words}, proven.", True
     if step.gap_mm <= goal.limit_mm:
@@ -88,6 +89,6 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     at = position(nodes[step.outcome.contact[step.worst]], nodes)
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
-        words += f"; in {share} it is {rounded_up(step.gap_mm)} mm"
-    more = f"{rounded_up(step.gap_mm - goal.limit_mm)} mm more than allowed"
+        words += f"; in {share} it is {on_its_side(step.gap_mm, goal.limit_mm)} mm"
+    more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
     return f"FAIL: {words}, {more}; case {worst} is the worst, at {at}.", False

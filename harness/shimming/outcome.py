@@ -15,7 +15,7 @@ from harness.scene.mesh_error import estimated, mesh_record
 from harness.scene.solution import solve
 from problems.model.fastener_forces import fastener_forces
 from problems.scene_files import read_scene
-from report.document.numbers import counted, position, rounded_up, upwards
+from report.document.numbers import counted, on_its_side, position, upwards
 
 from .patches import BORDERS
 from .study import ShimStudy
@@ -29,8 +29,9 @@ def sentence_of(result: SearchOutcome, goal: Goal, study: ShimStudy) -> tuple[st
     least = step or min(result.steps, key=lambda step: step.gap_mm)
     figures = least.outcome.further[least.worst]
     gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
-    most = "".join(f", {rounded_up(value)} {unit}" for value, limit, unit in more if limit < inf)
-    leave = f"{rounded_up(gaps.max())} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
+    most = "".join(f", {on_its_side(value, limit)} {unit}" for value, limit, unit in more if limit < inf)
+    largest = on_its_side(gaps.max(), goal.limit_mm or 0.0)
+    leave = f"{largest} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
     if step is None:
         words = "no shims of the stock are found with which all limits are kept; the best tried leave"
         at = [*(f"in patch {patch.name}" for patch in study.patches), "beyond all patches"]

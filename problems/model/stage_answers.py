@@ -9,7 +9,7 @@ springs. Without a preload they are free of force in s, whose answer is then the
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar, overload
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,7 +22,6 @@ from .scene import JointScene, Scene
 from .stages import Acting, Elements, StagePlan, acting_effects, of_effect
 
 Answer = TypeVar("Answer")
-AnyScene = TypeVar("AnyScene", JointScene, Scene)
 #: Of an answer x (n, k), mm: Tᵀx (r, k) for directions T (n, r).
 Elongations: TypeAlias = Callable[[sp.csc_array], Matrix]
 
@@ -102,7 +101,15 @@ def stage_scenes(scene: JointScene) -> dict[str, JointScene]:
     return {step.name: _scene(scene, step, step.elements) for step in steps}
 
 
-def last_scene(scene: AnyScene) -> AnyScene:
+@overload
+def last_scene(scene: JointScene) -> JointScene: ...
+
+
+@overload
+def last_scene(scene: Scene) -> Scene: ...
+
+
+def last_scene(scene: Scene) -> Scene:
     """The scene at the end of the last stage, see `stage_scenes`; the scene itself if it has no stages."""
     return [*stage_scenes(scene).values()][-1] if isinstance(scene, JointScene) else scene
 

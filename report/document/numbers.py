@@ -39,12 +39,6 @@ def upwards(bound: float, digits: int = 2) -> str:
     return f"{bound if shown is None else shown:.{digits - 1}e}"
 
 
-def rounded_up(bound: object) -> str:
-    """0.0913: three digits of a bound above 0.0912, never less than it is; inf where there is none."""
-    shown = raised(bound)
-    return "inf" if shown is None else f"{shown:g}"
-
-
 def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:
     """'(1077.93, 0) mm', to 0.01 mm; on nodes within less than a metre, to 1e-5 of their extent."""
     extent = float(np.ptp(nodes, axis=0).max())
@@ -72,6 +66,11 @@ def without_rounding(least: float, largest: float) -> float:
 def digits_beside(limit: float, value: float) -> int:
     """How many digits show a value on its side of a limit: three, or as many more as it takes."""
     return next(k for k in range(3, 18) if (float(f"{value:.{k - 1}e}") > limit) == (value > limit))
+
+
+def on_its_side(value: float, limit: float) -> str:
+    """0.10004 beside 0.1: a value, maybe infinite, with the digits that show it on its side of a limit."""
+    return f"{value:.{digits_beside(limit, value)}g}"
 
 
 def beside(limit: float) -> Callable[[object], str]:

