@@ -3,6 +3,7 @@ all they need: a start takes a fiftieth of its time. What starts them is unchang
 and their ends.
 """
 
+import gc
 import os
 import signal
 import subprocess
@@ -87,6 +88,7 @@ def forked_command(*words: object, before: Callable[[], object] = lambda: None) 
     def call() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        gc.callbacks.clear()  # those of hypothesis: an interrupt in one of them would be lost
         sys.argv[1:] = map(str, words)
         before()
         app.main()
