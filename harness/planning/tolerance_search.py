@@ -8,7 +8,7 @@ took at most a tenth of the time limit.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from math import inf, sqrt
 
@@ -111,31 +111,44 @@ def in_a_good_form(m: Measurement, rows: Sequence[Row]) -> bool:
 def next_tolerance(m: Measurement, rows: Sequence[Row]) -> float | None:
     """The next of the tolerances tried for m's solver in its form on m's scene, or None at the end.
 
-    The first is the decade tried last on another scene or by another variant. A decade that sufficed, or at
-    which the solver gave no answer, is followed by the next looser one; one that was solved and missed the
-    limit by the next tighter one. Between one that misses by little and one that suffices, half a decade is
-    tried. The search ends where all these were tried or do not exist, and where all tolerances tried exceeded
-    a limit: two of them, or a single one after a search on another scene.
+    The first is the decade tried last on another scene, with these settings if there is such a row. A
+    decade at which the solver gave no answer is followed by the next looser one; one that was solved and
+    missed the limit by the next tighter one. One that sufficed is followed by a looser one, in steps of 1,
+    2, 4, … decades, or half-way to the next that did not suffice where the step would pass it. Between one
+    that misses by little and one that suffices, half a decade is tried. The search ends where all these
+    were tried or do not exist, and where all tolerances tried exceeded a limit: two of them, or a single
+    one after a search on another scene.
     """
     same = [row for row in rows if (row["solver"], row["form"]) == (m.solver, m.form) and not row["repeat"]]
     searched = [row for row in same if row["tolerance"] in HALF_DECADES]
     own = _of_cell(m, searched)  # perhaps several of a tolerance, as workers once made them
     tried = {HALF_DECADES.index(row["tolerance"]): row for row in own}
     if not tried:
-        decades = [row["tolerance"] for row in searched if row["tolerance"] in HALF_DECADES[::DECADE]]
-        return float(decades[-1]) if decades else START
+        decades = [row for row in searched if row["tolerance"] in HALF_DECADES[::DECADE]]
+        decades = [row for row in decades if m.same_settings(row)] or decades
+        return float(decades[-1]["tolerance"]) if decades else START
     enough = 2 if len(own) == len(searched) else 1
     if len(tried) >= enough and all(row["status"] in EXCEEDED for row in tried.values()):
         return None
     within = [k for k, row in tried.items() if row["verdict"] == "within"]
     missed = [k for k, row in tried.items() if row["status"] == "solved" and k not in within]
-    if within and min(within) % DECADE:
+    if not within:
+        k = max(missed) + DECADE if missed else min(tried) - DECADE
+    elif min(within) % DECADE:
         return None
-    k = min(within) - DECADE if within else max(missed) + DECADE if missed else min(tried) - DECADE
-    looser = tried.get(k, {}) if within else {}
-    if looser and (looser.get("displacement_error_mm") or inf) <= LITTLE * looser["limit_mm"]:
-        k += 1
+    else:
+        k = _looser(min(within), len(within), tried)
+        looser = tried.get(k, {})
+        if looser and (looser.get("displacement_error_mm") or inf) <= LITTLE * looser["limit_mm"]:
+            k += 1
     return HALF_DECADES[k] if k in range(len(HALF_DECADES)) and k not in tried else None
+
+
+def _looser(enough: int, times: int, tried: Collection[int]) -> int:
+    """The place of the decade to try after the loosest that sufficed, the last of so many that did."""
+    missed = max((k for k in tried if k < enough), default=-DECADE)
+    k = enough - DECADE * 2 ** (times - 1)
+    return k if k > missed else missed + (enough - missed) // DECADE // 2 * DECADE
 
 
 def _of_cell(m: Measurement, rows: Sequence[Row]) -> list[Row]:

@@ -77,13 +77,13 @@ def test_the_search_ends_at_the_first_tolerance_that_suffices(tmp_path: Path) ->
     (cell,) = results.cells.to_dict("records")
     assert (cell["label"], cell["tolerance"], cell["repeats"]) == ("rough (dual)", enough, 2)
 
-    # On a second scene it starts where it ended: the tolerance tried last, and the one beside it.
+    # On a second scene it starts where it ended: the two tolerances beside one another.
     data = suite.model_dump(exclude_none=True) | {"repeats": 1}
     second = tmp_path / "second.npz"
     second.write_bytes(Path(*suite.scenes).read_bytes())
     data["scenes"] = [*suite.scenes, str(second)]
     rows = measured(suite_from(data, tmp_path / "s.toml"), tmp_path / "out")
-    assert [row["tolerance"] for row in rows if row["scene"] == "second"] == [looser, enough]
+    assert {row["tolerance"] for row in rows if row["scene"] == "second"} == {looser, enough}
     assert read(tmp_path / "out").cells["tolerance"].nunique() == 1
 
 
@@ -137,6 +137,11 @@ def test_it_ends_where_the_solver_gives_up(tmp_path: Path) -> None:
         ({1e-6: "time_limit", 1e-5: "time_limit"}, None),
         ({1e-6: "time_limit", 1e-5: "outside"}, None),
         ({1e-6: "inaccurate", 1e-5: "within", 1e-4: "within", 1e-3: "within"}, None),
+        ({1e-9: "within", 1e-8: "within"}, 1e-6),
+        ({1e-9: "within", 1e-8: "within", 1e-6: "within"}, 1e-4),
+        ({1e-9: "within", 1e-8: "within", 1e-6: "outside"}, 1e-7),
+        ({1e-9: "within", 1e-8: "within", 1e-6: "outside", 1e-7: "within"}, None),
+        ({1e-9: "within", 1e-8: "within", 1e-6: "outside 2e-7", 1e-7: "within"}, 3e-7),
         ({1e-16: "outside"}, None),
         ({1e-3: "outside 3.1e-7", 1e-4: "within"}, 3e-4),
         ({1e-3: "outside 3.2e-7", 1e-4: "within"}, None),
@@ -165,6 +170,9 @@ def test_a_search_after_one_on_another_scene_starts_at_its_last_tolerance(tmp_pa
     assert next_tolerance(m, [*rows, row_of(replace(m, tolerance=1e-5), 1.0)]) == 1e-4
     half = row_of(replace(m, tolerance=3e-7), 1.0) | {"scene": "a"}
     assert next_tolerance(m, [*rows, half]) == 1e-5  # a search begins at a decade
+    other = row_of(replace(m, tolerance=1e-9), 1.0) | {"scene": "a", "options": {"least": 1e-12}}
+    assert next_tolerance(m, [*rows, other]) == 1e-5
+    assert next_tolerance(m, [other]) == 1e-9
 
 
 def test_a_tolerance_that_was_measured_twice_counts_once(tmp_path: Path) -> None:
