@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import tiny_joint
 from commands import harness
+from refusals import refusal_of
 
 from harness.measurement.suite_run import batches
 from harness.planning.overrides import Overrides, overridden
@@ -129,9 +130,7 @@ def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
     forms = ["duel"]
     """
     path = tiny_joint.write_suite(tmp_path, text, scenes=["4386/9999"], time_limit_s=-1, tolerence=[1.0])
-    with pytest.raises(InputError) as caught:
-        read_suite(str(path))
-    faults = {fault.key: fault for fault in caught.value.faults}
+    faults = {fault.key: fault for fault in refusal_of(read_suite, str(path)).faults}
     assert set(faults) == {
         *("scenes", "time_limit_s", "tolerence"),
         *("solver.0.name", "solver.0.form", "solver.1.forms.0"),

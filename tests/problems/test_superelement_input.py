@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refusal_of
 from superelements import Array, Tables, flat, scene_from, solved, with_bay, write_nodes, write_part
 
 from problems.build import prepared
@@ -102,9 +103,7 @@ def test_what_is_not_read_of_a_part_is_noted(tmp_path: Path) -> None:
 
 
 def refused(parts: list[Tables], *effects: Tables, **joint: Any) -> list[Fault]:
-    with pytest.raises(InputError) as error:
-        prepared(scene_from(parts, *effects, **joint))
-    return error.value.faults
+    return refusal_of(lambda: prepared(scene_from(parts, *effects, **joint))).faults
 
 
 def test_all_files_are_checked_at_once(tmp_path: Path) -> None:
