@@ -34,10 +34,7 @@ def solve(
     tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
     form: Annotated[
         options.FormName | None,
-        option(
-            "FORM",
-            "primal, dual or sparse: without condensation.  [default: by size]",
-        ),
+        option("FORM", "primal, dual or sparse: without condensation.  [default: by size]"),
     ] = None,
     reference_limit: options.ReferenceLimit = None,
     allow_gap: options.AllowGap = None,
