@@ -80,11 +80,7 @@ def test_a_gap_after_what_is_locked_unproven_is_not_known(
     ("change", "options", "said"),
     [
         (("", ""), ("--sweep", "initial_gap.mean=0.1,0.2"), "has stages"),
-        (
-            ('kind = "initial_gap"', 'kind = "initial_gap"\nname = "gap"'),
-            (),
-            "a series replaces it",
-        ),
+        (('kind = "initial_gap"', 'kind = "initial_gap"\nname = "gap"'), (), "a series replaces it"),
     ],
 )
 def test_what_does_not_go_through_stages(

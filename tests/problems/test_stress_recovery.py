@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from commands import harness
+from commands import harness, wrong_usage
 from refusals import refusal_of
 from superelements import Array, Tables, flat, scene_from, two_plates, write_part
 
@@ -253,9 +253,7 @@ def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str)
 def test_validate_reads_what_the_scene_asks_for(tmp_path: Path) -> None:
     point_matrix(tmp_path, GOOD[:3], TWO)
     (tmp_path / "j.toml").write_text(TOML, "utf-8")
-    done = harness("validate", tmp_path / "j.toml")
-    assert done.exit_code == 2
-    assert "S.shape" in done.output
+    assert "S.shape" in wrong_usage("validate", tmp_path / "j.toml")
     (tmp_path / "j.toml").write_text(TOML.replace("stress = true", ""), "utf-8")
     assert harness("validate", tmp_path / "j.toml").exit_code == 0
 

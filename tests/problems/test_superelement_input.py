@@ -53,10 +53,7 @@ def missing(folder: Path) -> list[Tables]:
 
 
 FILES: dict[str, tuple[Callable[[Path], list[Tables]], str, str, str]] = {
-    "lost nodes": (
-        lambda folder: [*two(folder)[:1], _shorter(folder)],
-        "rows of K", "24", "20 nodes of",
-    ),
+    "lost nodes": (lambda folder: [*two(folder)[:1], _shorter(folder)], "rows of K", "24", "20 nodes of"),
     "an id twice": (lambda f: two(f, id=[1, 2, 3, 3, *range(5, 25)]), "id", "3", "each id once"),
     "an id that is no number": (lambda f: two(f, id=[1.5, *range(2, 25)]), "id", "1.5", "whole numbers"),
     "another planet": (lambda f: two(f, xyz=BEYOND), "line 5", "4,9.22", "up to 1e+15"),
