@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from report.writers.comparison_report import Comparison
 
 LINES = 20  # of a table
+LEFT_OUT = ("seconds", "status")  # for whole lines on a terminal
 
 
 def compare(
@@ -90,7 +91,7 @@ def _show(comparison: Comparison, console: Console) -> None:
     from report.document.escape import plain
     from report.writers.comparison_report import COLUMNS
 
-    columns = [column for column in COLUMNS if column.heading not in ("seconds", "status")]  # whole lines
+    columns = [column for column in COLUMNS if column.heading not in LEFT_OUT]
     changed = comparison.table[~comparison.table["group"].isin([ADDED, SAME])]
     title = plain(f"{comparison.old} → {comparison.new}")
     table = Table(*(column.heading for column in columns), title=title)
