@@ -19,3 +19,10 @@ def harness(*words: object) -> Result:
 def onto(text: StringIO) -> ConsoleReporter:
     """A reporter whose sentences come into a text."""
     return ConsoleReporter(Console(file=text, width=200))
+
+
+def wrong_usage(*words: object) -> str:
+    """What a command says of wrong usage or bad input, in one line."""
+    done = harness(*words)
+    assert done.exit_code == 2, done.output
+    return " ".join(done.stderr.split())

@@ -125,11 +125,8 @@ def matrix_market(draw: Draw, M: Any, symmetric: bool) -> str:
 def abaqus(draw: Draw, K: Any, labels: Any) -> str:
     """K by nodes and degrees of freedom, or without labels by rows and columns."""
     between, write = draw.one("between", ",|, |  "), number(draw, open="D")
-    names = (
-        [between.join(map(str, row)) for row in labels]
-        if labels is not None
-        else [*map(str, range(1, len(K) + 1))]
-    )
+    rows = [[k] for k in range(1, len(K) + 1)] if labels is None else labels
+    names = [between.join(map(str, row)) for row in rows]
     lines = [between.join([names[i], names[j], write(v)]) for i, j, v in entries(draw, K, ANY)]
     return draw.one("header", "|*MATRIX ASSEMBLE\n|** ü\n") + "\n".join(lines) + "\n"
 

@@ -138,17 +138,13 @@ def _answer(random: Random, blocks: list[Integers], A: Integers) -> tuple[Intege
     closed, weak = random.choice([0.0, 0.3, 1.0]), random.choice([0.0, 0.3, 1.0])
     lam = np.where(kind < closed, random.integers(1, 100, m), 0)
     y = np.where((lam > 0) | (random.random(m) < weak), 0, random.integers(1, 100, m))
-    K = _block_diagonal(blocks)
+    K = np.asarray(sp.block_diag(blocks).toarray(), dtype=np.int64)
     if m == n > 7 and random.random() < 0.5:  # Fathi's own load, where K and A are his: f = 0, g = −1
         first = np.eye(n, dtype=np.int64)[0]
         x, lam, y = first - 2, first, 1 - first
     f, g = K @ x + A @ lam, A.T @ x + y
     largest = max((abs(K) @ abs(x) + abs(A) @ lam).max(), (abs(A).T @ abs(x) + y).max(initial=0))
     return (x, lam, f, g) if largest < EXACT else None
-
-
-def _block_diagonal(blocks: list[Integers]) -> Integers:
-    return np.asarray(sp.block_diag(blocks).toarray(), dtype=np.int64)
 
 
 def _powers(random: Random, bits: int, size: int) -> Vector:

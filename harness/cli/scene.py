@@ -1,6 +1,7 @@
 """The commands for a scene: init, validate, solve."""
 
 import shlex
+from functools import partial
 from pathlib import Path
 from string import Template
 from typing import Annotated
@@ -33,10 +34,7 @@ def solve(
     tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
     form: Annotated[
         options.FormName | None,
-        option(
-            "FORM",
-            "primal, dual or sparse: without condensation.  [default: by size]",
-        ),
+        option("FORM", "primal, dual or sparse: without condensation.  [default: by size]"),
     ] = None,
     reference_limit: options.ReferenceLimit = None,
     allow_gap: options.AllowGap = None,
@@ -75,22 +73,19 @@ def solve(
         from harness.scene.solve import solve_into
         from harness.scene.two_scenes import solve_both
 
-        def solved(source: str, folder: Path) -> int:
-            return solve_into(
-                source,
-                solver,
-                tolerance,
-                folder,
-                console,
-                reference_limit,
-                form,
-                allow_gap,
-                refine,
-                allow_stress,
-            )
-
+        solved = partial(
+            solve_into,
+            solver=solver,
+            tolerance=tolerance,
+            console=console,
+            reference_limit_s=reference_limit,
+            form=form,
+            allow_gap_mm=allow_gap,
+            refine=refine,
+            allow_stress=allow_stress,
+        )
         if other is None:
-            raise typer.Exit(solved(scene, out))
+            raise typer.Exit(solved(scene, out=out))
         raise typer.Exit(solve_both((scene, other), out, solved, console))
 
 

@@ -34,17 +34,13 @@ def record_suite(
         if rows or path.exists():
             return
     elif other_suite(directory, suite):
-        _refuse_to_forget(path, plan, rows)
+        planned = {m.key for m in plan}
+        try:
+            earlier = expand(read_written(path))
+        except InputError as error:
+            why = f"which rows it lacks cannot be known from its {path.name}: {OTHER}"
+            raise InputError([*error.faults, Fault("--out", "directory", str(directory), why)]) from error
+        if lost := [m.key for m in unmeasured(earlier, rows) if m.key not in planned]:
+            why = f"its {path.name} plans {lost[0]}, which has no row yet and is not in this run"
+            raise InputError.one("--out", "directory", str(directory), f"{why}: finish that run, or {OTHER}")
     records.replace_text(path, text)
-
-
-def _refuse_to_forget(path: Path, plan: Sequence[Measurement], rows: Sequence[Row]) -> None:
-    directory, planned = str(path.parent), {m.key for m in plan}
-    try:
-        earlier = expand(read_written(path))
-    except InputError as error:
-        why = f"which rows it lacks cannot be known from its {path.name}: {OTHER}"
-        raise InputError([*error.faults, Fault("--out", "directory", directory, why)]) from error
-    if lost := [m.key for m in unmeasured(earlier, rows) if m.key not in planned]:
-        why = f"its {path.name} plans {lost[0]}, which has no row yet and is not in this run"
-        raise InputError.one("--out", "directory", directory, f"{why}: finish that run, or {OTHER}")

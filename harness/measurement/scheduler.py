@@ -67,9 +67,8 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
             try:
                 client = stack.enter_context(Client(scheduler, timeout=CONNECT_TIMEOUT))
             except (OSError, TimeoutError, ValueError) as error:
-                raise InputError.one(
-                    "--scheduler", "scheduler", scheduler, f"does not answer: {error}"
-                ) from error
+                allowed = f"does not answer: {error}"
+                raise InputError.one("--scheduler", "scheduler", scheduler, allowed) from error
         stack.enter_context(_silent_if_interrupted(client, own_workers=count is not None))
         yield _connected(client, scheduler, console)
 

@@ -30,12 +30,7 @@ from harness.results.records import Row
 from harness.results.schema import ROUND, Origin
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import ConsoleReporter, Display
-from harness.verification.reference_problem import (
-    ReferenceProblem,
-    measurable,
-    record,
-    record_refusal,
-)
+from harness.verification.reference_problem import ReferenceProblem, measurable, record, record_refusal
 from problems.forms import default_form, form_family
 from problems.forms.problem import in_form
 from problems.scene_files import read_scene

@@ -127,7 +127,8 @@ class Run(Reporter):
             cases = list(load_cases(scene, self.measurements))
             if problem.prepared.model_s is not None:
                 self.events.report(model_s=problem.prepared.model_s + time.perf_counter() - start)
-            read_all_pages(problem.arrays)
+            for array in problem.arrays:  # each page, so that no solver's time includes a cold file cache
+                array.ravel(order="K")[:: PAGE // array.itemsize].sum()
             stored = StoredFiles(problem.arrays)
         session = SolverSession(solver, problem, m.tolerance, self)
         batched = m.entry.batched
@@ -239,12 +240,6 @@ def load_cases(scene: Scene, measurements: Sequence[Measurement]) -> Iterator[Lo
     for each in measurements:
         assert each.case is not None
         yield cases.load(each.case)
-
-
-def read_all_pages(arrays: Sequence[Matrix]) -> None:
-    """Read every page of the matrices, so that no solver's time includes a cold file cache."""
-    for array in arrays:
-        array.ravel(order="K")[:: PAGE // array.itemsize].sum()
 
 
 def threads_in_effect() -> Report:

@@ -35,9 +35,8 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
             yield new
             if target.exists() and new.is_dir() != target.is_dir():
                 kind = "folder" if new.is_dir() else "file"
-                raise InputError.one(
-                    "--out", "path", str(out), f"a {kind} is to be written, and this is none"
-                )
+                allowed = f"a {kind} is to be written, and this is none"
+                raise InputError.one("--out", "path", str(out), allowed)
             if new.is_dir():
                 _record_files(new / RECORD)
                 refuse_inputs([*(out / path.name for path in new.iterdir()), *_listed(target)], inputs)

@@ -106,11 +106,9 @@ def refuse_incomparable(old: Side, new: Side) -> None:
     before = {measurement(row): row for row in old.rows}
     shared = [(before[name], row) for row in new.rows if (name := measurement(row)) in before]
     if not shared:
-        of = sorted({str(row.get("suite")) for row in old.rows})
+        of, others = (sorted({str(row.get("suite")) for row in side.rows}) for side in (old, new))
         allowed = f"no measurement of {old.name} (suite {', '.join(of)}) is in it"
-        raise Incomparable.one(
-            new.name, "suite", sorted({str(row.get("suite")) for row in new.rows}), allowed
-        )
+        raise Incomparable.one(new.name, "suite", others, allowed)
     faults = list(dict.fromkeys(fault for pair in shared for fault in _differences(old, new, *pair)))
     if faults:
         raise Incomparable(faults[:MAX_FAULTS])

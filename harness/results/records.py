@@ -78,12 +78,8 @@ def read(path: Path) -> list[Row]:
     """All rows; none if there is no file. Raises InputError naming a line that is torn or not JSON."""
     rows, torn = _split(path)
     if torn:
-        raise InputError.one(
-            path,
-            f"line {len(rows) + 1}",
-            torn.decode(errors="replace"),
-            "torn by an interrupted run; `run` into the same directory removes it and continues",
-        )
+        allowed = "torn by an interrupted run; `run` into the same directory removes it and continues"
+        raise InputError.one(path, f"line {len(rows) + 1}", torn.decode(errors="replace"), allowed)
     return rows
 
 
@@ -210,12 +206,8 @@ def locked(
         lock = filelock.FileLock(directory / ".lock", timeout=0)
         lock.acquire()
     except filelock.Timeout:
-        raise InputError.one(
-            "--out",
-            "directory",
-            str(directory),
-            "another run is writing here: wait, or name another directory",
-        ) from None
+        allowed = "another run is writing here: wait, or name another directory"
+        raise InputError.one("--out", "directory", str(directory), allowed) from None
     except OSError as error:
         raise InputError.one("--out", "directory", str(directory), f"cannot be written: {error}") from error
     try:

@@ -101,20 +101,16 @@ def export(
     if reference_limit_s is not None and not with_reference:
         raise InputError.one("--reference-limit", "seconds", reference_limit_s, "needs --with-reference")
     if format not in ([None] if form else formats.FORMATS):
-        a_format = f"one of {', '.join(formats.FORMATS)}; none with --form"
-        allowed = (
-            "none with --form: PATH.npz is one file, any other PATH a folder of .mtx" if form else a_format
-        )
+        allowed = f"one of {', '.join(formats.FORMATS)}; none with --form"
+        if form:
+            allowed = "none with --form: PATH.npz is one file, any other PATH a folder of .mtx"
         raise InputError.one("--format", "format", format, allowed)
     if with_reference and out.suffix in (".mps", ".qps", ".parquet"):
         raise InputError.one("--with-reference", "path", str(out), ".npz or a folder: it holds no answer")
     if form is not None and out.suffix == ".parquet":
         if not isinstance(scene, str | Path):
-            name, allowed = (
-                load_scene(scene).name,
-                "the name of a suite or its file: a .parquet has its scenes",
-            )
-            raise InputError.one("SUITE", "name", name, allowed)
+            allowed = "the name of a suite or its file: a .parquet has its scenes"
+            raise InputError.one("SUITE", "name", load_scene(scene).name, allowed)
         return _write_test_set(str(scene), out, form, console_of(reporter))
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     read = load_scene(scene)

@@ -52,9 +52,8 @@ def edited(
         there = read_toml(assembly := assembly_path(home / "scene", document["assembly"])).get("effect", [])
         changed = (*kinds, "initial_gap") if law else kinds
         if wrong := [table["kind"] for table in there if table.get("kind") in changed]:
-            raise InputError.one(
-                assembly, "effect", wrong, "these in the scene itself, where they can change"
-            )
+            allowed = "these in the scene itself, where they can change"
+            raise InputError.one(assembly, "effect", wrong, allowed)
     if law:
         with_gaps(law)(document)
     change(document)

@@ -198,23 +198,19 @@ def solve(
         choice = chosen_form(scene, forms, asked)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
-    like: ReferenceProblem | None = None
-
-    def answered(part: Scene) -> Solution:
-        nonlocal like
-        answer = _solved(part, named, choice, tolerance, limit_s, clock, like)
-        like = answer.problem
-        return answer
-
+    how = named, choice, tolerance, limit_s, clock
     if not (isinstance(scene, JointScene) and scene.stages):
-        return answered(scene)
+        return _solved(scene, *how)
 
+    like: ReferenceProblem | None = None
     locks_mm = 0.0  # the largest bound on an answer in which fasteners lock
 
     def of_stage(part: JointScene, approaches: Matrix) -> tuple[Elongations, tuple[Solution, float]]:
+        nonlocal like
         clock.where = f"{part.title}: "
-        answer, before_mm = answered(locked(part, approaches[:, 0])), locks_mm
-        reference, at_junction = answer.problem.reference, answer.problem.prepared.assembly.at_junction
+        answer, before_mm = _solved(locked(part, approaches[:, 0]), *how, like), locks_mm
+        like = answer.problem
+        reference, at_junction = like.reference, like.prepared.assembly.at_junction
 
         def elongations(T: sp.csc_array) -> Matrix:
             nonlocal locks_mm

@@ -97,15 +97,12 @@ def solve_into(
             line["exceeded"] = check["exceeded"]
         record["allowed_gap"] = allowed_gap.check_answer(solution, allow_gap_mm, record["pairs"], mesh)
     if allow_gap_mm is not None or stressed or solution.stages:
-        from report.page.answer_page_data import (
-            headline,
-            stage_lines,
-        )  # slow to import: not before the answer
+        # Slow to import: not before the answer.
+        from report.page.answer_page_data import headline, stage_lines
 
         verdict = headline(record, arrays)
         if solution.stages:
-            history = stage_lines(record, arrays)
-            console.print(table_of(history))
+            console.print(table_of(stage_lines(record, arrays)))
         if allow_gap_mm is not None or allow_stress is not None:
             code = code or show_verdict(verdict["kind"], [verdict["text"]], console)
         elif stressed:

@@ -30,9 +30,7 @@ OUTPUTS = ("contacts.csv", "fasteners.csv", "index.html", "pairs.csv")
 SHIFT = 0.05  # of the junction's longer side, by which the corners of two meshes of it may differ
 
 
-def solve_both(
-    sources: tuple[str, str], out: Path, solve: Callable[[str, Path], int], console: Console
-) -> int:
+def solve_both(sources: tuple[str, str], out: Path, solve: Callable[..., int], console: Console) -> int:
     """Solve both into DIR/first and DIR/second, write DIR/comparison.md and its files, print what changed.
 
     Returns the exit code of the second, or 1 if the first has no good answer. Raises InputError, also if
@@ -44,7 +42,7 @@ def solve_both(
     for source, folder in zip(sources, FOLDERS, strict=True):
         console.print()
         console.print(source, style="bold")
-        codes.append(solve(source, out / folder))
+        codes.append(solve(source, out=out / folder))
     from report.document.escape import plain
     from report.document.numbers import whole
     from report.writers.two_answers_report import write

@@ -66,7 +66,9 @@ def run(
 def solve_remaining(
     job: Job, count: int, results: Iterator[list[Result]], directory: Path, console: Console
 ) -> None:
-    """Write the results as they come; no other process writes."""
+    """Write the results as they come, and print those without an answer or outside the limit; no other
+    process writes.
+    """
     record_contacts(job, directory)
     begun, made = time.monotonic(), 0
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
@@ -76,17 +78,10 @@ def solve_remaining(
             series_file.append(directory, some)
             made += len(some)
             bar.update(task, completed=made)
-            print_failures(some, console)
+            for row in (result.row for result in some if result.row["verdict"] in ("outside", "no_answer")):
+                why = row["message"] or f"{row.get('displacement_error_mm') or 0:.1e} mm off"
+                console.print(f"case {row['case']}: {row['status']}, {row['verdict']}: {why}", style="red")
     console.print(f"{counted(made, 'case')} in {time.monotonic() - begun:.1f} s")
-
-
-def print_failures(results: list[Result], console: Console) -> None:
-    """Print a line for each case without an answer or outside the limit."""
-    for result in results:
-        row = result.row
-        if row["verdict"] in ("outside", "no_answer"):
-            why = row["message"] or f"{row.get('displacement_error_mm') or 0:.1e} mm off"
-            console.print(f"case {row['case']}: {row['status']}, {row['verdict']}: {why}", style="red")
 
 
 def identity(job: Job) -> dict[str, Any]:

@@ -39,7 +39,6 @@ BLOCK_BYTES = 2**26  # of their f or x: some fifteen times as much is in use
 BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases are lost
 KEPT_ANSWERS = 32  # for warm starts: memory does not grow with the number of cases
 
-
 ReportEvent = Callable[..., None]
 
 
@@ -248,10 +247,9 @@ class SeriesSession(Reporter):
             "active": assessment.active,
             "bound_mm": assessment.bound_mm,
             "gap_error_mm": float(gap_error.max()),
-            **{
-                name: getattr(assessment, name)
-                for name in ("primal_residual", "dual_residual", "duality_gap")
-            },
+            "primal_residual": assessment.primal_residual,
+            "dual_residual": assessment.dual_residual,
+            "duality_gap": assessment.duality_gap,
             "min_gap_mm": float(assessment.gap.min()),
             "mean_gap_mm": float(assessment.gap.mean()),
             "max_gap_mm": float(assessment.gap.max()),

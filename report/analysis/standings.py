@@ -81,11 +81,6 @@ def geometric_mean(values: pd.Series[float]) -> float:
     return float(math.exp(values.map(math.log).mean(skipna=False)))
 
 
-def shifted_geometric_mean(values: pd.Series[float]) -> float:
-    """exp(mean log(t + s)) − s, s = SHIFT_S; missing if one of the values is."""
-    return geometric_mean(values + SHIFT_S) - SHIFT_S
-
-
 def best_tolerances(cells: pd.DataFrame) -> pd.DataFrame:
     """One cell per method and scene: the tolerance that is fastest within the limit, else least wrong."""
     missed = cells["verdict"] != "within"
@@ -108,8 +103,9 @@ def standings(cells: pd.DataFrame) -> pd.DataFrame:
     within the limit, then by time relative to the fastest on the scenes it answered.
 
     load_case_s_<n> : the geometric mean at size n, of the methods within the limit on every scene of it.
-    shifted_mean_s : the shifted geometric mean of `total_s`, of the methods measured on every scene; one that
-    is not within the limit counts with the largest time limit on its scene.
+    shifted_mean_s : the shifted geometric mean of `total_s`, exp(mean log(t + s)) − s, s = SHIFT_S, of the
+    methods measured on every scene; one that is not within the limit counts with the largest time limit on
+    its scene.
     """
     cells = cells[cells["status"] != "unsupported"]
     limits = cells.groupby("scene")["time_limit_s"].transform("max")
@@ -132,7 +128,7 @@ def standings(cells: pd.DataFrame) -> pd.DataFrame:
         line["slower"] = geometric_mean(times) if len(times) else np.inf
         spent = mine["total_s"].where(mine["verdict"] == "within", mine["time_limit_s"])
         everywhere = len(mine) == cells["scene"].nunique()
-        line["shifted_mean_s"] = shifted_geometric_mean(spent) if everywhere else np.nan
+        line["shifted_mean_s"] = geometric_mean(spent + SHIFT_S) - SHIFT_S if everywhere else np.nan
         line |= {"share": line["within"] / len(mine), "worst_error_mm": mine["displacement_error_mm"].max()}
         lines.append(line | {"peak_rss_mib": mine["peak_rss_mib"].max()})
     table = pd.DataFrame(lines)

@@ -8,14 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from report.analysis.standings import (
-    ACCURACIES,
-    can_judge,
-    cells_of_curves,
-    curves,
-    fastest_first,
-    pareto,
-)
+from report.analysis.standings import ACCURACIES, can_judge, cells_of_curves, curves, fastest_first, pareto
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.figures import style

@@ -148,7 +148,9 @@ def section(results: Results) -> Section | None:
         "Cached matrices count with the seconds that they took to make."
     )
     blocks: list[Block] = [Table("roads", caption, table[kept], columns, keys=2)]
-    answered = _at_the_ends(best_tolerances(lines[lines["total_1_s"].notna()]))
+    best = best_tolerances(lines[lines["total_1_s"].notna()])
+    scenes = best.drop_duplicates("scene").sort_values(["n", "active", "scene"]).groupby("n")["scene"]
+    answered = best[best["scene"].isin([*scenes.first(), *scenes.last()])]  # of each size, fewest and most
     answered = answered[answered.groupby("scene")["method"].transform("nunique") > 1]
     if len(answered):
         caption = (
@@ -163,12 +165,6 @@ def _total(line: Mapping[str, Any], load_cases: int) -> str:
     if line["verdict"] == "within":
         return significant(line[f"total_{load_cases}_s"])
     return seconds_text(line) if load_cases == LOAD_CASES[0] else ""
-
-
-def _at_the_ends(cells: pd.DataFrame) -> pd.DataFrame:
-    """The scenes of each size with the fewest and the most active contacts."""
-    scenes = cells.drop_duplicates("scene").sort_values(["n", "active", "scene"]).groupby("n")["scene"]
-    return cells[cells["scene"].isin([*scenes.first(), *scenes.last()])]
 
 
 def _stacked(lines: pd.DataFrame) -> Drawing:

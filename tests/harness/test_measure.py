@@ -99,11 +99,7 @@ def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("solver", "form", "stages"),
-    [
-        ("newton", "sparse", "K"),
-        ("piqp", "primal", "K"),
-        ("gi", "primal", "K factors Q"),
-    ],
+    [("newton", "sparse", "K"), ("piqp", "primal", "K"), ("gi", "primal", "K factors Q")],
 )
 def test_what_an_answer_needed_from_the_scene_on(folder: Path, solver: str, form: str, stages: str) -> None:
     """In the sparse form the process makes the model; in a dense one it opens the stages it needs."""

@@ -22,11 +22,6 @@ def strips(*effects: dict[str, object]) -> Solution:
     return solve({"title": "strips", "joint": STRIPS, "effect": [gap, *effects]}, form="sparse")
 
 
-def finest(found: Solution, factor: float) -> float:
-    """How far the gaps are from those of a mesh of `factor` times as many lines."""
-    return on_mesh(found, remeshed(found.problem.scene.joint, factor))[0]
-
-
 PLANS = {
     "fasteners at nodes": [{"kind": "fasteners", "preload": 400.0, "points": [[50, 30], [250, 30]]}],
     "fasteners between nodes": [
@@ -44,7 +39,7 @@ PLANS = {
 def test_the_estimate_is_about_the_distance_to_a_far_finer_mesh(plan: str) -> None:
     found = strips(*PLANS[plan])
     two, three = estimated(found), estimated(found, refine=True)
-    true = finest(found, 4.0)
+    true, *_ = on_mesh(found, remeshed(found.problem.scene.joint, 4.0))
     assert (two.grids, two.order, three.grids) == (2, None, 3)
     assert true / 2 < three.error_mm < 2 * true
     assert true / 2 < two.error_mm < 20 * true  # rough, and rarely too small

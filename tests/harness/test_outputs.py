@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
-from commands import harness
+from commands import harness, wrong_usage
 from strip_scene import write_strip
 
 from harness.results.records import PLANS
@@ -45,9 +45,7 @@ def test_an_answer_replaces_no_file_that_its_scene_names(tmp_path: Path) -> None
     assert not harness("export", "gallery/sheet-over-former", "--format", "npz", "--out", matrices).exit_code
     scene.write_text('[matrices]\nproblem = "out/solution.npz"\n')
     content = matrices.read_bytes()
-    done = harness("solve", scene, "--out", tmp_path / "out")
-    assert done.exit_code == 2
-    assert "is one of the files that are read" in done.stderr
+    assert "is one of the files that are read" in wrong_usage("solve", scene, "--out", tmp_path / "out")
     assert matrices.read_bytes() == content
 
 
@@ -77,9 +75,8 @@ def test_a_file_that_no_command_wrote_is_left_alone(
     file.parent.mkdir(exist_ok=True)
     file.write_text("mine")
     before = sorted(tmp_path.rglob("*"))
-    done = harness(*command.split(), "--out", ".")
-    assert done.exit_code == 2
-    assert f"has {Path(name).parts[0]} of another command: name another directory" in done.stderr
+    told = wrong_usage(*command.split(), "--out", ".")
+    assert f"has {Path(name).parts[0]} of another command: name another directory" in told
     assert sorted(tmp_path.rglob("*")) == before
     assert file.read_text() == "mine"
 
@@ -95,9 +92,8 @@ def test_a_scan_among_the_files_of_a_report_is_left_alone(
     Path("report/worst-case.csv").write_text("x,y,gap\n")
     for journal in (SERIES, PLANS):
         Path(journal).touch()
-    done = harness(*command.split(), "--around", "report/worst-case.csv", "--out", ".")
-    assert done.exit_code == 2
-    assert "report/worst-case.csv': is one of the files that are read" in done.stderr
+    told = wrong_usage(*command.split(), "--around", "report/worst-case.csv", "--out", ".")
+    assert "report/worst-case.csv': is one of the files that are read" in told
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -118,6 +114,4 @@ def test_refused_before_work(command: str, out: str, tmp_path: Path, monkeypatch
 
 @pytest.mark.parametrize("option", ["--json", "--junit"])
 def test_a_folder_is_no_file_of_findings(option: str, tmp_path: Path) -> None:
-    done = harness("gate", tmp_path, option, tmp_path)
-    assert done.exit_code == 2
-    assert "cannot be written: it is a folder" in done.stderr
+    assert "cannot be written: it is a folder" in wrong_usage("gate", tmp_path, option, tmp_path)

@@ -28,12 +28,7 @@ from suite_runs import is_alive, rows_of, said_by, series_rows, wait_for
 
 from harness.measurement import scheduler
 from harness.measurement.monitored_call import TRIM, environment
-from harness.measurement.scheduler import (
-    TASKS_PER_WORKER,
-    done_as_completed,
-    versions,
-    workers,
-)
+from harness.measurement.scheduler import TASKS_PER_WORKER, done_as_completed, versions, workers
 from harness.measurement.suite_run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
@@ -51,9 +46,8 @@ pytestmark = pytest.mark.slow
 CASES = 24
 ROOT = Path(__file__).parents[2]
 VERSIONS = versions()
-DASK = importlib.util.find_spec("distributed") is not None
 QUIET = Console(quiet=True)
-needs_dask = pytest.mark.skipif(not DASK, reason="needs Dask")
+needs_dask = pytest.mark.skipif(not importlib.util.find_spec("distributed"), reason="needs Dask")
 
 
 @pytest.fixture

@@ -17,7 +17,6 @@ from harness.series.staged import StagedSession
 from harness.verification.judge import LIMIT_MM
 from problems.build import load_case
 from problems.forms import Form
-from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
 
 COUNT = 3
@@ -35,7 +34,8 @@ def test_each_case_goes_through_all_stages(scene: Path, tmp_path: Path, form: Fo
     command = "series", scene, "--cases", COUNT, "--form", form, "--solver", solver, "--out", tmp_path / "s"
     assert harness(*command, "--limit", 1e-6, "--tolerance", 1e-10).exit_code == 0
     read = scene_at(scene)
-    shims = load_case(replace(read, stages=())).g - load_case(without_shims(read)).g
+    without = tuple(effect for effect in read.effects if effect.kind != "shims")
+    shims = load_case(replace(read, stages=())).g - load_case(replace(read, effects=without, stages=())).g
     cases = GapCases(count=COUNT).of(last_scene(read), form)
     rows = sorted(series_file.rows(tmp_path / "s"), key=lambda row: row["case"])
     assert len(rows) == COUNT
@@ -76,20 +76,11 @@ def test_a_gap_after_what_is_locked_unproven_is_not_known(
     assert unknown == ["cannot_be_judged", False]
 
 
-def without_shims(scene: JointScene) -> JointScene:
-    rest = tuple(effect for effect in scene.effects if effect.kind != "shims")
-    return replace(scene, effects=rest, stages=())
-
-
 @pytest.mark.parametrize(
     ("change", "options", "said"),
     [
         (("", ""), ("--sweep", "initial_gap.mean=0.1,0.2"), "has stages"),
-        (
-            ('kind = "initial_gap"', 'kind = "initial_gap"\nname = "gap"'),
-            (),
-            "a series replaces it",
-        ),
+        (('kind = "initial_gap"', 'kind = "initial_gap"\nname = "gap"'), (), "a series replaces it"),
     ],
 )
 def test_what_does_not_go_through_stages(

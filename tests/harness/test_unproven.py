@@ -19,13 +19,9 @@ pytestmark = pytest.mark.usefixtures("blank_pictures")
 K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
 
 
-def write(folder: Path, stiffness: np.ndarray, f: float) -> str:
-    np.savez(folder / "mine.npz", K=stiffness, A=np.eye(3), f=np.full(3, f), g=np.zeros(3))
-    return str(folder / "mine.npz")
-
-
 def said(folder: Path, f: float, stiffness: np.ndarray = K) -> tuple[int, str]:
-    return said_by(solve_into, write(folder, stiffness, f), None, 1e-9, folder / "out")
+    np.savez(folder / "mine.npz", K=stiffness, A=np.eye(3), f=np.full(3, f), g=np.zeros(3))
+    return said_by(solve_into, str(folder / "mine.npz"), None, 1e-9, folder / "out")
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

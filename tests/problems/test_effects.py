@@ -149,10 +149,8 @@ def test_rounding_does_not_change_a_random_gap(length: float) -> None:
     deviation, where roots of eigenvalues near zero differ by 1e-8.
     """
     grid = np.linspace(0.0, 4000.0, 258)
-    root, mirrored = (
-        square_root(grid.tobytes(), length),
-        square_root((4000.0 - grid[::-1]).tobytes(), length)[::-1, ::-1],
-    )
+    root = square_root(grid.tobytes(), length)
+    mirrored = square_root((4000.0 - grid[::-1]).tobytes(), length)[::-1, ::-1]
     Z = np.random.default_rng(5).standard_normal((258, 20))
     np.testing.assert_allclose(mirrored @ Z, root @ Z, rtol=0, atol=1e-9)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / length) ** 2)

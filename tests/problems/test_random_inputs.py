@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refusal_of
 from scipy import stats
 from small_joints import JOINT, make_scene
 from strip_scene import STRIP, write_strip
@@ -239,9 +240,8 @@ def test_a_draw_off_the_parts_names_keys_and_values(tmp_path: Path) -> None:
 
 
 def test_all_faults_are_told_at_once(scene: Scene) -> None:
-    with pytest.raises(InputError) as error:
-        drawn(scene, PRELOAD, PRELOAD, "a=b", "fasteners.points.x=normal(0, -1)", count=None, contributors=3)
-    keys = [fault.key for fault in error.value.faults]
+    laws = PRELOAD, PRELOAD, "a=b", "fasteners.points.x=normal(0, -1)"
+    keys = [fault.key for fault in refusal_of(drawn, scene, *laws, count=None, contributors=3).faults]
     assert keys == ["key", "key", "distribution", "distribution", "N, inputs"]
 
 

@@ -30,10 +30,8 @@ def scenes() -> list[JointScene]:
 
 def test_a_name_gives_the_same_joint_everywhere(scenes: list[JointScene]) -> None:
     """The digits are those of `printf 0.2.0/superelements/7 | sha256sum`, and of …/7/1 for the next eight."""
-    first, later = (
-        "18b1ec24 c92d8167 a6776a7b 63d5847b 7163501c 7323eb70 d4144004 3fe3ffa7",
-        "f6dcf691 dacf20e6 df90d802 e509daee cae42739 ddb4dd05 c977d645 89924950",
-    )
+    first = "18b1ec24 c92d8167 a6776a7b 63d5847b 7163501c 7323eb70 d4144004 3fe3ffa7"
+    later = "f6dcf691 dacf20e6 df90d802 e509daee cae42739 ddb4dd05 c977d645 89924950"
     shares = [int(word, 16) / 2**32 for word in f"{first} {later}".split()]
     scene, (gap, fasteners, *_) = scenes[7], scenes[7].effects
     assert len(scene.joint.names) == 2 + int(2 * shares[0])

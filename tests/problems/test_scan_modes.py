@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refusal_of
 from scipy.linalg import subspace_angles
 from small_joints import JOINT, make_scene
 
@@ -54,12 +55,8 @@ def test_the_fewest_modes_that_keep_the_share(tmp_path: Path) -> None:
     for r in (1, 2, 3):
         below = scan_modes(SCENE, pattern, 1, 0, variance=float(shares[r - 1]) - 1e-6)
         assert len(below.modes) == r
-    equal = (
-        write(tmp_path / "equal", np.full((3, len(NODES)), 0.3))
-        if (tmp_path / "equal").mkdir() is None
-        else ""
-    )
-    cases = scan_modes(SCENE, equal, 2, 0)
+    (tmp_path / "equal").mkdir()
+    cases = scan_modes(SCENE, write(tmp_path / "equal", np.full((3, len(NODES)), 0.3)), 2, 0)
     assert len(cases.modes) == 0
     assert np.array_equal(cases.load(1).g, cases.mean)
 
@@ -89,9 +86,7 @@ def test_faults_of_all_scans_at_once(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x,y,gap\n0,0,1\n1,1,1\n2,2,1\n")
     (tmp_path / "b.csv").write_text("x,y,gap\n0,0,1\n")
     (tmp_path / "c.csv").write_text("x,y\n0,0\n")
-    with pytest.raises(InputError) as refused:
-        scan_modes(SCENE, pattern, 1, 0)
-    said = str(refused.value)
+    said = str(refusal_of(scan_modes, SCENE, pattern, 1, 0))
     assert all(name in said for name in ("a.csv", "b.csv", "c.csv"))
     assert "000.csv" not in said
     with pytest.raises(InputError, match="two files or more; 1 there"):

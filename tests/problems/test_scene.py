@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from refusals import refusal_of
 from strip_scene import STRIP, strip_with
 
 from problems.errors import Fault, InputError
@@ -19,10 +20,9 @@ def path(tmp_path: Path) -> Path:
 
 def faults(path: Path, text: str | bytes) -> list[Fault]:
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(InputError) as error:
-        read_scene(str(path))
-    assert len(str(error.value).splitlines()) == len(error.value.faults)
-    return error.value.faults
+    error = refusal_of(read_scene, str(path))
+    assert len(str(error).splitlines()) == len(error.faults)
+    return error.faults
 
 
 def swapped(*pairs: tuple[str, str]) -> str:

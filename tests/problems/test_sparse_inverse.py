@@ -32,12 +32,6 @@ from problems.stiffness.sparse_block import GeneralBlock, sparse_block
 SINGLE = 2e-5  # of √(Z_ii Z_jj): float32, through a few dozen blocks
 
 
-def inverse_of(K: sp.csc_array) -> tuple[np.ndarray, np.ndarray]:
-    """K⁻¹ and √diag(K⁻¹)."""
-    Z = np.linalg.inv(K.toarray())
-    return Z, np.sqrt(np.diag(Z))
-
-
 @pytest.mark.parametrize("half", [0, 1, 2, 3, 7, 15])
 @pytest.mark.parametrize("seed", seeds(2, 6))
 def test_the_inverse_near_the_diagonal(half: int, seed: int) -> None:
@@ -45,7 +39,8 @@ def test_the_inverse_near_the_diagonal(half: int, seed: int) -> None:
     random = np.random.default_rng(100 * half + seed)
     n = int(random.integers(1, 60)) if seed else 4 * (half + 1)
     K = band_matrix(random, n, half)
-    Z, scale = inverse_of(K)
+    Z = np.linalg.inv(K.toarray())
+    scale = np.sqrt(np.diag(Z))
     L = BandedBlock(K, half_bandwidth(K)).L
     for reach in {0, 1, half, 2 * half + 1, n - 1, n}:
         rows = np.flatnonzero(random.random(n) < random.choice([0.3, 1.0]))
@@ -101,10 +96,8 @@ def test_without_a_band_there_is_none() -> None:
 @pytest.mark.parametrize("seed", seeds(1, 3))
 def test_it_is_that_of_the_dense_matrices(n: int, half: int, m: int, seed: int) -> None:
     random = np.random.default_rng(seed)
-    K, A = (
-        band_matrix(random, n, half),
-        sp.csc_array(sp.random_array((n, m), density=0.05, random_state=random)),
-    )
+    K = band_matrix(random, n, half)
+    A = sp.csc_array(sp.random_array((n, m), density=0.05, random_state=random))
     Q = A.T @ np.linalg.solve(K.toarray(), A.toarray())
     order = random.permutation(n)
     for block, columns in (

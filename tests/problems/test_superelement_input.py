@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refusal_of
 from superelements import Array, Tables, flat, scene_from, solved, with_bay, write_nodes, write_part
 
 from problems.build import prepared
@@ -52,10 +53,7 @@ def missing(folder: Path) -> list[Tables]:
 
 
 FILES: dict[str, tuple[Callable[[Path], list[Tables]], str, str, str]] = {
-    "lost nodes": (
-        lambda folder: [*two(folder)[:1], _shorter(folder)],
-        "rows of K", "24", "20 nodes of",
-    ),
+    "lost nodes": (lambda folder: [*two(folder)[:1], _shorter(folder)], "rows of K", "24", "20 nodes of"),
     "an id twice": (lambda f: two(f, id=[1, 2, 3, 3, *range(5, 25)]), "id", "3", "each id once"),
     "an id that is no number": (lambda f: two(f, id=[1.5, *range(2, 25)]), "id", "1.5", "whole numbers"),
     "another planet": (lambda f: two(f, xyz=BEYOND), "line 5", "4,9.22", "up to 1e+15"),
@@ -102,9 +100,7 @@ def test_what_is_not_read_of_a_part_is_noted(tmp_path: Path) -> None:
 
 
 def refused(parts: list[Tables], *effects: Tables, **joint: Any) -> list[Fault]:
-    with pytest.raises(InputError) as error:
-        prepared(scene_from(parts, *effects, **joint))
-    return error.value.faults
+    return refusal_of(lambda: prepared(scene_from(parts, *effects, **joint))).faults
 
 
 def test_all_files_are_checked_at_once(tmp_path: Path) -> None:

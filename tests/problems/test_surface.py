@@ -14,10 +14,6 @@ def crossings(x: np.ndarray = LINES[0], y: np.ndarray = LINES[1]) -> np.ndarray:
     return np.column_stack([each.ravel() for each in np.meshgrid(x, y)])
 
 
-def turned(nodes: np.ndarray, angle: float) -> np.ndarray:
-    return nodes @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-
-
 def test_a_grid_is_found_in_any_order_of_its_nodes_and_apart_from_rounding() -> None:
     nodes = crossings()
     order = np.random.default_rng(1).permutation(len(nodes))
@@ -42,7 +38,8 @@ def test_linear_fields_are_met_and_nodes_are_themselves(seed: int, scattered: bo
     random = np.random.default_rng(seed)
     nodes = crossings()
     if scattered:
-        nodes = turned(nodes + random.uniform(-0.2, 0.2, nodes.shape), 0.4)
+        turn = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]])
+        nodes = (nodes + random.uniform(-0.2, 0.2, nodes.shape)) @ turn
     surface = surface_of(nodes)
     np.testing.assert_array_equal(surface.weights(nodes).toarray(), np.eye(len(nodes)))
     points = random.dirichlet(np.ones(3), 50)  # inside triangles of the surface

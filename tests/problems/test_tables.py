@@ -33,7 +33,6 @@ READ = {
     "tabs": "X\tY\tGap\n0\t0\t0,1\n2000\t0\t0,9\n1250\t300\t0,5\n",
     "minus": "x;y;gap\n0;0;.1\n2000;\u22120;.9\n1250;300;.5\n",
 }
-BLANKS = READ["blanks and apostrophes"].replace("1\u202f250", "1'250")
 
 
 @pytest.mark.parametrize("name", READ)

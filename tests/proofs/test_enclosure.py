@@ -212,10 +212,8 @@ def test_the_residuals_of_a_problem_in_its_units(kind: str, seed: int) -> None:
     load = made.load(loads)
     r, s = made.residuals(load, x, lam)
     for k, case in enumerate(loads):
-        force, gap = (
-            wanted_of(case.f[:, None], both, at[:, [k]], 0),
-            wanted_of(case.g[:, None], A.T, at[:16, [k]], 0),
-        )
+        force = wanted_of(case.f[:, None], both, at[:, [k]], 0)
+        gap = wanted_of(case.g[:, None], A.T, at[:16, [k]], 0)
         units = exactly(made.D[:, 0]), exactly(made.R[:, 0])
         assert max(missed(r, k, [d * v for d, v in zip(units[0], force, strict=True)])) <= 0
         assert max(missed(s, k, [d * v for d, v in zip(units[1], gap, strict=True)])) <= 0

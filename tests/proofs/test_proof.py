@@ -118,10 +118,8 @@ def test_a_force_out_of_balance_moves_the_answer_in_the_unit_of_its_unknown(kind
 def test_a_softer_K_has_a_wider_bound(kind: Any, kappa: float) -> None:
     """1/κ by forces, 1/√κ by gaps."""
     proof, _ = springs(kind, 4.0)
-    by_force, by_gap = (
-        (LoadCase(array(4.0), array(10.0)), array(1.001), array(0.0)),
-        (LoadCase(array(10.0), array(1.0)), array(0.999), array(10 - 4 * 0.999)),
-    )
+    by_force = LoadCase(array(4.0), array(10.0)), array(1.001), array(0.0)
+    by_gap = LoadCase(array(10.0), array(1.0)), array(0.999), array(10 - 4 * 0.999)
     proof.kappa = kappa
     assert 1e-3 / kappa <= bound(proof, *by_force) <= 1.03e-3 / kappa
     assert 1e-3 * (1 - 1e-12) / np.sqrt(kappa) <= bound(proof, *by_gap) <= 1.03e-3 / np.sqrt(kappa)

@@ -68,10 +68,8 @@ def test_a_round_on_a_slower_machine_has_the_same_ratios(tmp_path: Path) -> None
         slower = each | {"machine": "Slower CPU", "solve_s": 7 * each["solve_s"], "beside_round": when}
         again = slower | {"round": when, "beside_round": None}
         made += [slower] if each["owner"] == "library" else [each, again]
-    ratios, expected = (
-        table(tmp_path / "two", made).loc[ONE_MORE],
-        table(tmp_path / "one", rows()).loc[ONE_MORE],
-    )
+    ratios = table(tmp_path / "two", made).loc[ONE_MORE]
+    expected = table(tmp_path / "one", rows()).loc[ONE_MORE]
     assert ratios.to_dict() == pytest.approx(expected.to_dict())
     assert not read(tmp_path / "two").rows["round"].any()
 

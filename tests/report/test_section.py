@@ -11,15 +11,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from report.document.blocks import Table, number, word
-from report.document.numbers import (
-    beside,
-    coordinate,
-    extent,
-    position,
-    raised,
-    significant,
-    upwards,
-)
+from report.document.numbers import beside, coordinate, extent, position, raised, significant, upwards
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.page.answer_page_data import headline

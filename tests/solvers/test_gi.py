@@ -25,15 +25,6 @@ def grow(G: np.ndarray, members: list[int]) -> GrowingFactor:
     return factor
 
 
-def assert_is_factor(factor: GrowingFactor, G: np.ndarray, members: list[int]) -> None:
-    wanted = G[np.ix_(members, members)]
-    np.testing.assert_allclose(factor.R.T @ factor.R, wanted, atol=1e-10 * abs(G).max())
-    assert not np.tril(factor.R, -1).any()
-    b = np.arange(1.0, len(members) + 1)
-    np.testing.assert_allclose(factor.R @ factor.solve(b), b, atol=1e-8)
-    np.testing.assert_allclose(factor.R.T @ factor.solve_transposed(b), b, atol=1e-8)
-
-
 def test_members_come_and_go_many_times() -> None:
     G = definite(200, seed=2)
     rng = np.random.default_rng(3)
@@ -50,7 +41,12 @@ def test_members_come_and_go_many_times() -> None:
             position = int(rng.integers(len(members)))
             factor.delete(position)
             del members[position]
-    assert_is_factor(factor, G, members)
+    wanted = G[np.ix_(members, members)]
+    np.testing.assert_allclose(factor.R.T @ factor.R, wanted, atol=1e-10 * abs(G).max())
+    assert not np.tril(factor.R, -1).any()
+    b = np.arange(1.0, len(members) + 1)
+    np.testing.assert_allclose(factor.R @ factor.solve(b), b, atol=1e-8)
+    np.testing.assert_allclose(factor.R.T @ factor.solve_transposed(b), b, atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(6))

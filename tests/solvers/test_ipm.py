@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refusal_of
 from sample_size import ASKED
 from small_problems import by_nnls, definite, make_load, make_prepared, solve_by_nnls
 
@@ -205,9 +206,8 @@ def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyP
 
 
 def test_all_wrong_options_are_named_at_once() -> None:
-    with pytest.raises(InputError) as error:
-        Ipm(cg_tolerance=0.0, max_cg=0, start="", scheme="", preconditioner="W")
-    keys = {fault.key.removeprefix("options.") for fault in error.value.faults}
+    error = refusal_of(Ipm, cg_tolerance=0.0, max_cg=0, start="", scheme="", preconditioner="W")
+    keys = {fault.key.removeprefix("options.") for fault in error.faults}
     assert keys == {"cg_tolerance", "max_cg", "start", "scheme", "preconditioner"}
     with pytest.raises(InputError, match="open_last with V only"):
         Ipm(preconditioner="none", ordering="open_last")

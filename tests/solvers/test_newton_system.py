@@ -36,12 +36,6 @@ def matrix_of(name: str, Q: np.ndarray, D: np.ndarray) -> np.ndarray:
     return V
 
 
-def made(name: str, Q: np.ndarray) -> Preconditioned:
-    system = CholeskyPlusRoot(Q, ORDER) if name == "ordered" else SYSTEMS[name](Q)
-    assert isinstance(system, Preconditioned)
-    return system
-
-
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", ["none", "U", "V", "ordered", "splitting"])
 def test_the_preconditioned_operator_matches_its_definition(name: str, seed: int) -> None:
@@ -53,7 +47,8 @@ def test_the_preconditioned_operator_matches_its_definition(name: str, seed: int
     H = (Q + np.diag(D))[np.ix_(p, p)]
     wanted = np.linalg.solve(V.T, np.linalg.solve(V.T, H).T).T
 
-    preconditioner = made(name, Q)
+    preconditioner = CholeskyPlusRoot(Q, ORDER) if name == "ordered" else SYSTEMS[name](Q)
+    assert isinstance(preconditioner, Preconditioned)
     preconditioner.take(rng.uniform(1, 2, SIZE))  # what an update leaves must not stay
     preconditioner.take(D)
     found = np.column_stack([preconditioner.multiply(e) for e in np.eye(SIZE)])

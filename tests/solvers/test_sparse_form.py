@@ -102,11 +102,8 @@ def test_an_edge_of_contact_does_not_creep(dense: bool, n: int, most: int) -> No
     random = np.random.default_rng(0)
     A = sp.csc_array(sp.diags_array([-1.0, 2.0, -1.0], offsets=[0, -1, -2], shape=(n, n - 2)))
     f = np.sin(np.arange(n) / 300) + 0.1 * random.standard_normal(n)
-    data, load = (
-        Prepared(Assembly(Stiffness.of(np.eye(n) if dense else sp.eye_array(n, format="csc")), A)),
-        LoadCase(f, np.zeros(n - 2)),
-    )
-    answer = session_of("newton", data).next(load, None)
+    data = Prepared(Assembly(Stiffness.of(np.eye(n) if dense else sp.eye_array(n, format="csc")), A))
+    answer = session_of("newton", data).next(LoadCase(f, np.zeros(n - 2)), None)
     assert answer.status == "solved"
     assert answer.inner_iterations is not None
     assert answer.inner_iterations <= most

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import harness
+from commands import harness, wrong_usage
+from refusals import refusal_of
 from small_joints import SCENE
 
 from harness.planning.suite import read_suite
@@ -26,9 +27,7 @@ def scene_file(folder: Path, *replaced: tuple[str, str]) -> Path:
 
 
 def words_of(path: Path) -> str:
-    with pytest.raises(InputError) as caught:
-        read_scene(str(path))
-    return str(caught.value)
+    return str(refusal_of(read_scene, str(path)))
 
 
 PRESSURE = 'kind = "pressure"\npart = "a"\nvalue = 1e-3'
@@ -93,9 +92,7 @@ def test_an_option_that_is_not_bounded_or_without_effect_is_refused(
     places: dict[str, object] = {"SCENE": scene_file(tmp_path), "DIR": tmp_path, "PLUGIN": mine}
     command, *others = words.split()
     out = () if command in ("gate", "check") else ("--out", tmp_path / "out")
-    done = harness(command, *(places.get(word, word) for word in others), *out)
-    assert done.exit_code == 2
-    assert said in done.output
+    assert said in wrong_usage(command, *(places.get(word, word) for word in others), *out)
     assert not (tmp_path / "out").exists()
 
 
@@ -117,10 +114,9 @@ def test_a_suite_is_bounded(line: str, of_solver: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     scenes = "" if "scenes" in line else 'scenes = ["4386/0107"]'
     path.write_text(f'{line}\n{scenes}\n[[solver]]\nname = "newton"\n{of_solver}\n')
-    with pytest.raises(InputError) as caught:
-        read_suite(str(path))
-    assert (line or of_solver).partition(" ")[0] in str(caught.value)
-    assert ".toml" not in line or "without NUL" in str(caught.value)
+    said = str(refusal_of(read_suite, str(path)))
+    assert (line or of_solver).partition(" ")[0] in said
+    assert ".toml" not in line or "without NUL" in said
 
 
 @pytest.mark.parametrize("values", ["0.1:1.0:1000000000", "0:1:11000", "1:2:-3", "1:2:1e9"])
@@ -176,7 +172,5 @@ def test_loads_whose_displacements_overflow_are_refused(form: str, tmp_path: Pat
     K, A = 1e-3 * np.array([[2.0, 1.0], [1.0, 2.0]]), np.ones((2, 1))  # x = ±inf, p = inf − inf
     np.savez(tmp_path / "own.npz", K=K, A=A, g=np.ones(1), f=np.full(2, 1.7e308))
     given = ["solve", str(tmp_path / "own.npz"), "--form", form, "--out", str(tmp_path / "out")]
-    done = harness(*given)
-    assert done.exit_code == 2, done.output
-    assert "finite displacements" in done.output.replace("\n", " ")
+    assert "finite displacements" in wrong_usage(*given)
     assert not (tmp_path / "out").exists()

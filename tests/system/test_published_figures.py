@@ -32,10 +32,6 @@ def text(page: str) -> str:
     return " ".join((ROOT / page).read_text("utf-8").split())
 
 
-def by_size(values: list[float]) -> str:
-    return listed([significant(value, 2) for value in values])
-
-
 def test_the_speed_of_the_readme_is_the_table_of_the_index() -> None:
     """Which is that of the rows."""
     index = (PUBLISHED / "index.md").read_text("utf-8")
@@ -80,7 +76,7 @@ def test_the_rates_of_a_series_are_those_of_the_rows() -> None:
     later = rows.groupby(["n", "solver", "variant"])["later_s"].median().groupby("n").min()
     first, *others = (f"{significant(1 / s, 2)} at {n:.0f}" for n, s in later.items())
     first = first.replace(" at ", " load cases per second at n = ")
-    library = by_size(rows.groupby("n")["library_s"].first().tolist())
+    library = listed([significant(s, 2) for s in rows.groupby("n")["library_s"].first().tolist()])
     said = f"{listed([first, *others])}; a case of the fastest library takes {library} s"
     assert said in text("docs/series.md")
 
@@ -166,16 +162,11 @@ def test_the_index_is_that_of_the_rows(tmp_path: Path) -> None:
     assert index.count("](") == len(SUITES) + len(MEASURED_SERIES) + 1  # the paper's study
 
 
-def stated_minutes(suite: str) -> float:
-    """The time of a suite in the table of suites."""
-    page = (ROOT / "docs" / "suites.md").read_text("utf-8")
-    line = re.search(rf"^\| `{suite}` \|.*\| (?:(\d+) h ?)?(?:(\d+) min)? \|$", page, re.MULTILINE)
-    return 60 * int(line[1] or 0) + int(line[2] or 0)
-
-
 @pytest.mark.parametrize("suite", SUITES)
 def test_the_time_of_a_suite_is_that_of_its_rows(suite: str) -> None:
-    stated, taken = stated_minutes(suite), minutes(rows_of(PUBLISHED / suite))
+    page, taken = (ROOT / "docs" / "suites.md").read_text("utf-8"), minutes(rows_of(PUBLISHED / suite))
+    line = re.search(rf"^\| `{suite}` \|.*\| (?:(\d+) h ?)?(?:(\d+) min)? \|$", page, re.MULTILINE)
+    stated = 60 * int(line[1] or 0) + int(line[2] or 0)
     assert taken is not None
     assert abs(stated - taken) <= 2 or 1 / RANGE <= stated / taken <= RANGE, taken
 
