@@ -171,7 +171,7 @@ def _cards(path: Path) -> dict[str, Cards]:
 def _fields(path: Path, text: str) -> Iterator[list[tuple[int, str]]]:
     """Yield the fields of each card after its own name, with the numbers of their lines.
 
-    Raises InputError for a line with more fields than a card has.
+    Raises InputError for a line with more fields than a card has, and one that continues none.
     """
     card: list[tuple[int, str]] = []
     inside = False
@@ -180,10 +180,14 @@ def _fields(path: Path, text: str) -> Iterator[list[tuple[int, str]]]:
         if not line:
             continue
         words = line.split(",") if "," in line else [line[:8]]
-        begins = words[0].strip().upper() in ("DMIG", "DMIG*")
-        inside = begins or (inside and line[0] in " +*,")
+        first = words[0].strip().upper()
+        begins = first in ("DMIG", "DMIG*")
+        inside = begins or (inside and line[0] in " +*," and not first[:1].isalpha())
         if not inside:
             continue
+        if not begins and first[:1] not in ("", "+", "*"):
+            allowed = "a continuation, whose first field is blank or begins with + or *"
+            raise InputError.one(path, f"line {number}", line, allowed)
         count = 4 if "*" in words[0] else 8
         if len(words) == 1:
             words += [line[k : k + 64 // count] for k in range(8, 72, 64 // count)]
