@@ -112,6 +112,7 @@ def test_text_of_any_program(form: str) -> None:
     ("content", "name", "said"),
     [
         (b"*USER ELEMENT, NODES=2\n1,2\n*MATRIX, TYPE=STIFFNESS\n4,1\n", "K.mtx", "line 1 .*MATRIX OUTPUT"),
+        (b"*Matrix input, name=K, scale factor=1e3\n1,3,1,3,4.0\n", "K.mtx", "line 1 .*=1e3.: is not applied"),
         (b"1,3,1,3,4.0\n2,3,2,3,1.e36\n", "K.mtx", "node 2, dof 3.*a degree of freedom that is held"),
         (b"-1,3,-1,3,4.0\n1,3,1,3,3.0\n", "K.mtx", "= -1: 1 or more"),
         (b"1,1,4.0\n4,4,3.0\n", "K.mtx", "row 2"),
