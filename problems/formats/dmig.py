@@ -30,6 +30,12 @@ REAL = (1, 2)  # types
 WHOLE = re.compile(r"(\d+)")
 NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([-+]\d+)|[eEdD](\d+))?")
 INCLUDE = re.compile(r"(?mi)^[ \t]*include\b.*$")
+SCALED = re.compile(r"(?mi)^[ \t]*(?:dmigrot\b|param\*?[ \t,]+ck2\b).*$")  # factors of DMIG
+#: Lines by which the matrix is not what the cards say, and what is allowed.
+REFUSED = {
+    INCLUDE: "is not followed: give the file that holds the cards",
+    SCALED: "is not applied: multiply or turn the entries by it, and leave it out",
+}
 Point = tuple[int, int]
 
 
@@ -136,10 +142,10 @@ def _cards(path: Path) -> dict[str, Cards]:
     """The matrices of a file by their names, in capitals. Raises InputError."""
     matrices: dict[str, Cards] = {}
     text = read_text(path, "file", LARGEST_MIB)
-    if included := INCLUDE.search(text):
-        line = text.count("\n", 0, included.start()) + 1
-        allowed = "is not followed: give the file that holds the cards"
-        raise InputError.one(path, f"line {line}", included[0], allowed)
+    for pattern, allowed in REFUSED.items():
+        if found := pattern.search(text):
+            line = text.count("\n", 0, found.start()) + 1
+            raise InputError.one(path, f"line {line}", found[0], allowed)
     for (line, name), *fields in _fields(path, text):
         name = name.upper()
         point, component, third, *rest = fields

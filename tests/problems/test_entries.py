@@ -132,6 +132,7 @@ def test_text_of_any_program(form: str) -> None:
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,0\n", "K.pch", "line 2 = '0'"),
         (b"DMIG,K,0,6,2,0\nINCLUDE 'f.pch'\n", "K.pch", "line 2 = .INCLUDE .*not followed"),
         (b"DMIG,K,0,6,2,0\n  include 'f.pch'\n", "K.pch", "line 2 = .*include .*not followed"),
+        (b"PARAM,CK2,1e3\nDMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4.\n", "K.pch", "line 1 = .PARAM,CK2.*not applied"),
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4.\n 2,2,,-1.\n", "K.pch", "line 3 = . 2,2,,-1..: a continuation"),
         (text("mtx", [(1, 1, 4.0), (2, 1, np.nan)]), "K.mtx", r"K\[\d, \d\] = .NaN or infinity"),
         (text("dmig", LOWER) * 2, "K.pch", "line 7, a header of = 'KAA': also in line 2"),
