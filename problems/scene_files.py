@@ -208,8 +208,9 @@ def _joint(
     model: Any = SuperelementJointTable if is_own else Joint
     if (valid := valid_table(model, table, path, faults)) is None:
         return None
+    folder = path.parent.absolute()  # stresses are read when they are asked for: perhaps in another folder
     try:
-        joint: Any = SuperelementJoint.of(path.parent, valid) if is_own else valid
+        joint: Any = SuperelementJoint.of(folder, valid) if is_own else valid
     except InputError as error:
         faults += error.faults
         return None

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from harness.planning.form_choice import chosen_form
-from harness.scene.solution import Source, load_scene, solver_named
+from harness.scene.solution import Source, load_scene, refuse_not_positive, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.call_lock import in_turn
 from harness.solving.solver_session import forces_of, form_of
@@ -117,7 +116,7 @@ def judge(
     >>> judge(own_matrices([[100.0]], [[1.0]], [50.0], [0.2]), [0.2001]).verdict
     'outside'
     """
-    _refuse_limit("judge", limit_mm)
+    refuse_not_positive("judge", limit_mm=limit_mm)
     scene = load_scene(scene)
     problem = open_problem(scene, chosen_form(scene, FORMS, form).form)
     n, m = problem.prepared.assembly.n, problem.prepared.assembly.m
@@ -157,7 +156,7 @@ def solve_dual(
     Raises
     ------
     InputError
-        If Q or p is wrong, or the solver gives no valid answer.
+        If Q, p or the tolerance is wrong, or the solver gives no valid answer.
 
     Examples
     --------
@@ -165,6 +164,7 @@ def solve_dual(
     >>> solve_dual([[2.0, 0.0], [0.0, 1.0]], [4.0, -1.0], "gi").lam.tolist()
     [2.0, 0.0]
     """
+    refuse_not_positive("solve_dual", tolerance=tolerance)
     Q = np.asfortranarray(_numbers("solve_dual", "Q", Q))
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1]:
         raise InputError.one("solve_dual", "Q.shape", Q.shape, "must be a square matrix")
@@ -235,7 +235,7 @@ def solve_series(
     >>> [f"{result.gap[0]:.3f}" for result in solve_series(scene, cases)]
     ['0.000', '0.100']
     """
-    _refuse_limit("solve_series", limit_mm)
+    refuse_not_positive("solve_series", tolerance=tolerance, limit_mm=limit_mm)
     scene = load_scene(scene)
     name, chosen = solver_named(solver, options)
     taken = form_of(name, chosen.forms, form)
@@ -256,11 +256,6 @@ def solve_series(
         return _results(session, [cases])
     copies = _copies(cases, session.data.assembly)
     return _results(session, _blocks(list(copies) if isinstance(cases, Sequence) else copies, session.block))
-
-
-def _refuse_limit(where: str, limit_mm: float) -> None:
-    if not 0 < limit_mm < inf:
-        raise InputError.one(where, "limit_mm", limit_mm, "must be positive and finite")
 
 
 def _copies(cases: Iterable[LoadCase], assembly: Assembly) -> Iterator[LoadCase]:

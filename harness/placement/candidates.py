@@ -60,8 +60,8 @@ class MovableFasteners:
         """The holes that fasteners may go into, and their names if the CSV has a column `name`.
 
         holes : a pattern `4x32`, rows × columns of equal cells of the junction, or the path of a CSV with
-        columns x and y, mm, read by `options`; None: where the scene's fasteners are. Raises InputError if a
-        hole is off the parts, or there twice.
+        columns x and y, mm, under the headings of `options`; None: where the scene's fasteners are. Raises
+        InputError if a hole is off the parts, or there twice.
         """
         if holes is None:
             return self.current, {}
@@ -72,7 +72,8 @@ class MovableFasteners:
                 raise InputError.one("--candidates", "holes", holes, allowed)
             points, faults, labels = grid(self.bare, rows, columns), [], []
         else:
-            table = read_columns(Path(holes), ("x", "y"), options)
+            headings = replace(options, missing=())  # marks are of gaps
+            table = read_columns(Path(holes), ("x", "y"), headings)
             points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.words["name"]
         points = points.round(DIGITS)  # as plans have them: rounding may leave the parts
         faults = faults + self.faults(points, holes)

@@ -16,7 +16,7 @@ from harness.solving.solver_session import answer_of, form_of
 from harness.verification.assess import GapError, error_bound
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, open_stage
-from problems.errors import InputError
+from problems.errors import Fault, InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Matrix, Vector
 from problems.model.scene import JointScene, Scene
@@ -177,7 +177,7 @@ def solve(
     Raises
     ------
     InputError
-        If the scene is wrong, or the solver gives no valid answer.
+        If the scene or the tolerance is wrong, or the solver gives no valid answer.
 
     Notes
     -----
@@ -190,6 +190,7 @@ def solve(
     >>> print(f"{answer.gap.max():.3f} mm, {answer.judgement.verdict}")
     0.668 mm, within
     """
+    refuse_not_positive("solve", tolerance=tolerance)
     scene, clock = load_scene(scene), _Clock(reporter)
     named = None if solver is None else solver_named(solver, options)
     with clock.step("choosing the form"):
@@ -311,6 +312,14 @@ def _solved(
         problem=problem,
         scene=scene,
     )
+
+
+def refuse_not_positive(where: str, **numbers: float) -> None:
+    """Raise InputError for each number that is not above 0, or not finite."""
+    wrong = {name: value for name, value in numbers.items() if not 0 < value < inf}
+    if wrong:
+        allowed = "must be positive and finite"
+        raise InputError([Fault(where, name, value, allowed) for name, value in wrong.items()])
 
 
 def solver_named(solver: str | Solver, options: Mapping[str, Any] | None) -> tuple[str, Solver]:

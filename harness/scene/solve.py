@@ -4,7 +4,6 @@ DIR is written beside its place and moved there when it is whole; what an older 
 """
 
 import time
-from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from problems.scene_files import read_scene
 
 from . import allowed_gap, mesh_error
 from .answer_record import arrays_of, is_of_plates, recorded, summary
-from .solution import solve
+from .solution import refuse_not_positive, solve
 from .validate import print_unusual
 
 TOLERANCE = 1e-9  # of a named solver, by default
@@ -49,8 +48,7 @@ def solve_into(
     `mesh_error`. Raises InputError.
     """
     started = time.perf_counter()
-    if not 0 < tolerance < inf:
-        raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
+    refuse_not_positive("--tolerance", tolerance=tolerance)
     if solver is None and tolerance != TOLERANCE:
         raise InputError.one("--tolerance", "tolerance", tolerance, "needs --solver NAME")
     allowed_gap.refuse_unusable(allow_gap_mm)

@@ -30,6 +30,12 @@ REAL = (1, 2)  # types
 WHOLE = re.compile(r"(\d+)")
 NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([-+]\d+)|[eEdD](\d+))?")
 INCLUDE = re.compile(r"(?mi)^[ \t]*include\b.*$")
+SCALED = re.compile(r"(?mi)^[ \t]*(?:dmigrot\b|param\*?[ \t,]+ck2\b).*$")  # factors of DMIG
+#: Lines by which the matrix is not what the cards say, and what is allowed.
+REFUSED = {
+    INCLUDE: "is not followed: give the file that holds the cards",
+    SCALED: "is not applied: multiply or turn the entries by it, and leave it out",
+}
 Point = tuple[int, int]
 
 
@@ -136,10 +142,10 @@ def _cards(path: Path) -> dict[str, Cards]:
     """The matrices of a file by their names, in capitals. Raises InputError."""
     matrices: dict[str, Cards] = {}
     text = read_text(path, "file", LARGEST_MIB)
-    if included := INCLUDE.search(text):
-        line = text.count("\n", 0, included.start()) + 1
-        allowed = "is not followed: give the file that holds the cards"
-        raise InputError.one(path, f"line {line}", included[0], allowed)
+    for pattern, allowed in REFUSED.items():
+        if found := pattern.search(text):
+            line = text.count("\n", 0, found.start()) + 1
+            raise InputError.one(path, f"line {line}", found[0], allowed)
     for (line, name), *fields in _fields(path, text):
         name = name.upper()
         point, component, third, *rest = fields
@@ -171,7 +177,7 @@ def _cards(path: Path) -> dict[str, Cards]:
 def _fields(path: Path, text: str) -> Iterator[list[tuple[int, str]]]:
     """Yield the fields of each card after its own name, with the numbers of their lines.
 
-    Raises InputError for a line with more fields than a card has.
+    Raises InputError for a line with more fields than a card has, and one that continues none.
     """
     card: list[tuple[int, str]] = []
     inside = False
@@ -180,10 +186,14 @@ def _fields(path: Path, text: str) -> Iterator[list[tuple[int, str]]]:
         if not line:
             continue
         words = line.split(",") if "," in line else [line[:8]]
-        begins = words[0].strip().upper() in ("DMIG", "DMIG*")
-        inside = begins or (inside and line[0] in " +*,")
+        first = words[0].strip().upper()
+        begins = first in ("DMIG", "DMIG*")
+        inside = begins or (inside and line[0] in " +*," and not first[:1].isalpha())
         if not inside:
             continue
+        if not begins and first[:1] not in ("", "+", "*"):
+            allowed = "a continuation, whose first field is blank or begins with + or *"
+            raise InputError.one(path, f"line {number}", line, allowed)
         count = 4 if "*" in words[0] else 8
         if len(words) == 1:
             words += [line[k : k + 64 // count] for k in range(8, 72, 64 // count)]

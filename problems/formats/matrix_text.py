@@ -22,9 +22,15 @@ from problems.input.text_files import read_bytes
 
 NORMAL = 3  # the degree of freedom under which displacements are written to Abaqus
 ELEMENT = re.compile(rb"(?mi)^\*[ \t]*(?:USER[ \t]*ELEMENT|MATRIX[ \t]*,[ \t]*TYPE).*$")
+SCALED = re.compile(rb"(?mi)^\*[ \t]*MATRIX[ \t]*INPUT\b.*SCALE[ \t]*FACTOR.*$")
 COMMENT = re.compile(rb"(?m)^\*.*$")  # and keywords, such as *MATRIX ASSEMBLE
 BY_ROWS, BY_NODES = ("row", "column", "value"), ("node", "dof", "node", "dof", "value")
 ASK = "*MATRIX OUTPUT, STIFFNESS, FORMAT=MATRIX INPUT or COORDINATE: ask Abaqus for that"
+#: Keywords of a matrix that is not K, or not as it is listed, and what is allowed.
+REFUSED = {
+    ELEMENT: f"is of a user element; what is read is {ASK}",
+    SCALED: "is not applied: multiply the entries by the factor, and leave it out",
+}
 
 
 def is_matrix_market(path: Path) -> bool:
@@ -73,10 +79,10 @@ def read_abaqus(path: Path, choose: Choose) -> dict[str, tuple[sp.csr_array, np.
 
 def _read(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
     content = read_bytes(path, "file", LARGEST_MIB)
-    if element := ELEMENT.search(content):
-        number, line = content.count(b"\n", 0, element.start()) + 1, element[0].decode("latin-1")
-        allowed = f"is of a user element; what is read is {ASK}"
-        raise InputError.one(path, f"line {number}", line, allowed)
+    for pattern, allowed in REFUSED.items():
+        if found := pattern.search(content):
+            number, line = content.count(b"\n", 0, found.start()) + 1, found[0].decode("latin-1")
+            raise InputError.one(path, f"line {number}", line, allowed)
     body = COMMENT.sub(b"", content).replace(b",", b" ")
     by_rows = len(body.strip().partition(b"\n")[0].split()) == len(BY_ROWS)
     places, values, line_of = read_entries(path, body, 0, BY_ROWS if by_rows else BY_NODES)

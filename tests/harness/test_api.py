@@ -233,6 +233,18 @@ def test_limits_that_are_no_numbers_are_refused_from_python() -> None:
             refused()
 
 
+@pytest.mark.parametrize("tolerance", [np.nan, np.inf, -1e-9, 0.0])
+def test_a_tolerance_that_no_answer_meets_is_refused_from_python(tolerance: float) -> None:
+    scene = own_matrices(*matrices()[2])
+    for refused in (
+        lambda: solve(scene, tolerance=tolerance),
+        lambda: solve_dual(np.eye(2), np.ones(2), tolerance=tolerance),
+        lambda: solve_series(scene, [], tolerance=tolerance),
+    ):
+        with pytest.raises(InputError, match=rf": tolerance = {tolerance}: must be positive and finite"):
+            refused()
+
+
 def test_a_text_is_no_list(tmp_path: Path) -> None:
     """Its letters would be read as entries."""
     for refused, name in (

@@ -36,6 +36,7 @@ from harness.results.records import PLANS
 from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.build import load_case
 from problems.errors import InputError
+from problems.input.tables import TableOptions
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
@@ -661,6 +662,17 @@ def test_holes_are_checked_where_plans_have_them(strip: Path, tmp_path: Path) ->
     (tmp_path / "holes.csv").write_text("x,y\n200.0000004,10\n10,10\n")
     movable = MovableFasteners.of(read_scene(str(strip)))
     assert movable.candidates(str(tmp_path / "holes.csv"))[0] == ((10.0, 10.0), (200.0, 10.0))
+
+
+def test_a_mark_of_missing_gaps_leaves_out_no_hole(strip: Path, tmp_path: Path) -> None:
+    (tmp_path / "holes.csv").write_text("x,y\n10,0\n20,10\n")
+    movable, options = MovableFasteners.of(read_scene(str(strip))), TableOptions(missing=(0,))
+    assert movable.candidates(str(tmp_path / "holes.csv"), options)[0] == ((10.0, 0.0), (20.0, 10.0))
+
+
+def test_marks_of_missing_gaps_are_refused_beside_holes_alone() -> None:
+    (fault,) = GapCases(options=TableOptions(missing=(0,))).faults(table=True)
+    assert fault.where == "--missing"
 
 
 class ReachedError(Exception):

@@ -112,6 +112,7 @@ def test_text_of_any_program(form: str) -> None:
     ("content", "name", "said"),
     [
         (b"*USER ELEMENT, NODES=2\n1,2\n*MATRIX, TYPE=STIFFNESS\n4,1\n", "K.mtx", "line 1 .*MATRIX OUTPUT"),
+        (b"*Matrix input, name=K, scale factor=3\n1,3,1,3,4.0\n", "K.mtx", "line 1 .*=3.: is not applied"),
         (b"1,3,1,3,4.0\n2,3,2,3,1.e36\n", "K.mtx", "node 2, dof 3.*a degree of freedom that is held"),
         (b"-1,3,-1,3,4.0\n1,3,1,3,3.0\n", "K.mtx", "= -1: 1 or more"),
         (b"1,1,4.0\n4,4,3.0\n", "K.mtx", "row 2"),
@@ -131,6 +132,8 @@ def test_text_of_any_program(form: str) -> None:
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,0\n", "K.pch", "line 2 = '0'"),
         (b"DMIG,K,0,6,2,0\nINCLUDE 'f.pch'\n", "K.pch", "line 2 = .INCLUDE .*not followed"),
         (b"DMIG,K,0,6,2,0\n  include 'f.pch'\n", "K.pch", "line 2 = .*include .*not followed"),
+        (b"PARAM,CK2,1e3\nDMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4.\n", "K.pch", "line 1 = .PARAM,CK2.*not applied"),
+        (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4.\n 2,2,,-1.\n", "K.pch", "line 3 = . 2,2,,-1..: a continuation"),
         (text("mtx", [(1, 1, 4.0), (2, 1, np.nan)]), "K.mtx", r"K\[\d, \d\] = .NaN or infinity"),
         (text("dmig", LOWER) * 2, "K.pch", "line 7, a header of = 'KAA': also in line 2"),
         (b"%%MatrixMarket matrix array real skew-symmetric\n2 2\n1.0\n", "K.mtx", r"= \[-1.0, 1.0\]: K must"),
@@ -166,6 +169,10 @@ def test_one_matrix_of_several_is_chosen_by_name(form: str) -> None:
     if form.startswith("op4"):
         with pytest.raises(InputError, match="matrix 2 of 2 = 'KAA'"):
             read(content.replace(b"MAA", b"kaa"), name)
+
+
+def test_an_indented_card_does_not_continue_the_one_above() -> None:
+    np.testing.assert_array_equal(read(text("dmig", LOWER) + b" SPC1,1,,1.0\n", "KAA.pch"), K)
 
 
 def test_signs_in_paths_are_no_names() -> None:

@@ -186,6 +186,18 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     assert "labels" in str(fault.value)
 
 
+def test_a_recovery_matrix_is_that_of_the_folder_where_the_scene_was_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though it is read later, when another folder has a file of that name."""
+    for name, S in (("there", 2 * GOOD), ("here", GOOD)):
+        parts = point_matrix(tmp_path / name, S, TWO, stress="s.npz", stress_points="s.csv")
+    monkeypatch.chdir(tmp_path / "here")
+    scene = scene_from(parts)
+    monkeypatch.chdir(tmp_path / "there")
+    np.testing.assert_array_equal(scene.joint.parts[0].recovery.S.toarray(), GOOD)
+
+
 def test_it_is_in_no_key(tmp_path: Path) -> None:
     parts = point_matrix(tmp_path, GOOD, TWO)
     bare = [{key: value for key, value in part.items() if "stress" not in key} for part in parts]
