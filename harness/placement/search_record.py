@@ -12,7 +12,7 @@ from harness.placement.session import FastenerStudy
 from harness.results.provenance import stamp
 from problems.forms.assembly import Matrix
 from problems.storage import digest
-from report.document.numbers import beside, counted, position
+from report.document.numbers import beside, counted, position, raised, significant
 
 
 def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
@@ -79,8 +79,9 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     else:
         leave = "leaves" if len(step.plan) == 1 else "leave"
         fasteners = f"{which}{counted(len(step.plan), 'fastener')}"
-        most = beside(goal.limit_mm or 0.0)(step.gap_mm)
-        words = f"{fasteners} {leave} {most} mm in the one load case"
+        gap, limit = step.gap_mm, goal.limit_mm
+        shown = significant(raised(gap)) if limit is None else beside(limit)(gap)
+        words = f"{fasteners} {leave} {shown} mm in the one load case"
     if goal.limit_mm is None:
         return f"{words}, proven.", True
     if step.gap_mm <= goal.limit_mm:
