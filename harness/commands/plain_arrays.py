@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from math import inf
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy.linalg as sla
@@ -165,7 +165,7 @@ def solve_dual(
     >>> solve_dual([[2.0, 0.0], [0.0, 1.0]], [4.0, -1.0], "gi").lam.tolist()
     [2.0, 0.0]
     """
-    Q = np.asfortranarray(_numbers("solve_dual", "Q", Q))
+    Q = _numbers("solve_dual", "Q", Q, order="F")
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1]:
         raise InputError.one("solve_dual", "Q.shape", Q.shape, "must be a square matrix")
     if not np.isfinite(Q).all():
@@ -289,12 +289,12 @@ def _results(session: SeriesSession, blocks: Iterable[LoadCases]) -> Iterator[Re
             yield from some
 
 
-def _numbers(where: str, name: str, value: ArrayLike) -> Matrix:
+def _numbers(where: str, name: str, value: ArrayLike, order: Literal["K", "F"] = "K") -> Matrix:
     """A copy, which a form may make read-only. Raises InputError unless it has real numbers alone."""
     try:
         if np.iscomplexobj(value):  # NumPy would leave the imaginary parts out
             raise TypeError("complex")
-        numbers = np.array(value, dtype=float)
+        numbers = np.array(value, dtype=float, order=order)
     except (TypeError, ValueError) as error:
         raise InputError.one(where, name, value, "must be real numbers") from error
     if np.ma.is_masked(value):
