@@ -121,11 +121,12 @@ def _summary(series: Series) -> Table:
 
 
 def _statistics(series: Series) -> Table:
-    figures, shown = series.cases[list(GAPS)], beside(_limit(series))
+    figures = series.cases[list(GAPS)]
     table = figures.quantile(QUANTILES).T.rename(columns="q{:g}".format)
     table = table.assign(figure=list(GAPS.values()), mean=figures.mean(), largest=figures.max())
     columns = [word("mm", "figure"), number("mean", "mean")]
-    columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES] + [number("largest", "largest", shown)]
+    columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES]
+    columns.append(number("largest", "largest", beside(_limit(series))))
     return Table("statistics", "*Quantiles over the cases.*", table, columns)
 
 

@@ -200,7 +200,7 @@ def test_a_stress_that_overflows_passes_no_limit(monkeypatch: pytest.MonkeyPatch
 
 def test_a_stress_without_a_known_error_is_not_proven() -> None:
     record = stress_record(made((1.0, 0.0, 0.0), error=np.inf), None, 100.0)
-    assert record["said"].startswith("CANNOT BE TOLD: limit 100 N/mm²; largest von Mises stress 1.00 N/mm², plate")
+    assert record["said"].startswith("CANNOT BE TOLD: limit 100 N/mm²; largest")
     assert "; not proven, mesh error not known" in record["said"]
 
 

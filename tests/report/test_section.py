@@ -219,7 +219,12 @@ def test_more_digits_are_on_the_side_of_a_limit_too() -> None:
 
 @pytest.mark.parametrize(
     ("error", "said"),
-    [(3.21e-9, "proven to 3.3e-09 N"), (0.0, "proven to 0.0e+00 N"), (np.inf, "not proven"), (None, "not proven")],
+    [
+        (3.21e-9, "proven to 3.3e-09 N"),
+        (0.0, "proven to 0.0e+00 N"),
+        (np.inf, "not proven"),
+        (None, "not proven"),
+    ],
 )
 def test_what_has_no_finite_error_is_not_proven(error: float | None, said: str) -> None:
     assert proven_to(error, "N") == said
