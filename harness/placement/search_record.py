@@ -87,6 +87,8 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     if step.gap_mm <= goal.limit_mm:
         return f"PASS: {words}, proven.", True
     worst = step.worst if sample is None else sample.numbers[step.worst]
+    if step.gap_mm == inf:
+        return f"FAIL: {words}; nothing is proven of case {worst}.", False
     at = position(nodes[step.outcome.contact[step.worst]], nodes)
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"

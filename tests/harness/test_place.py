@@ -281,6 +281,16 @@ def test_a_gap_that_is_proven_without_a_limit_is_rounded_upwards() -> None:
     assert said == "1 fastener leaves 0.121 mm in the one load case, proven."
 
 
+def test_a_case_of_which_nothing_is_proven_is_named() -> None:
+    """Not as infinitely much more than allowed."""
+    step = Step(((0.0, 0.0),), np.inf, Outcome((0.1, np.inf), (0, 0), (0.1, 0.1)))
+    sample = Sample(step, range(7, 9), "fresh cases", 1, (0.1, 0.9), "fastener")
+    found = SearchOutcome([step], range(2), step, [sample], [step])
+    said, passed = sentence_on(found, Goal(0.5, 1.0), np.zeros((1, 2)))
+    assert said.endswith("of 2 fresh cases (95 % interval 10.0 to 90.0 %); nothing is proven of case 8.")
+    assert not passed
+
+
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])
 def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> None:
     """By binomial sums: more failures show the share no longer, and half as many pass four times in five."""
