@@ -193,7 +193,7 @@ def tolerance(
     lock = records.locked(directory, TOLERANCE, outputs=OUTPUTS)
     with lock, shared(scheduler, console_of(reporter)) as address:
         first, last = (bounds(value, None)[1] for value in (values[0], values[-1]))
-        if np.array_equal(first, last, equal_nan=True) and not np.isnan(first).all():
+        if np.array_equal(first, last, equal_nan=True) and np.isfinite(first).any():
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
         outcome, count = searched(kept, values, share, len(first)), len(first)
         limit = f"{allow_gap_mm:g} mm in {100 * share:g} % of the joints"

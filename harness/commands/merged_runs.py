@@ -31,7 +31,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
         if (folder / SUITE).is_file():
             read_written(folder / SUITE)
         for file in folder.glob("machine*.json"):
-            if not isinstance(named := records.parsed(file.read_bytes()).get("machine"), str):
+            if not isinstance(named := records.read_object(file).get("machine"), str):
                 raise InputError.one(file, "machine", named, "the name of the machine")
     rows = [row | dict.fromkeys(("answer", "log")) for side in sides for row in side.rows]
     (((key, machine), count),) = Counter((row.get("key"), row.get("machine")) for row in rows).most_common(1)
@@ -43,7 +43,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
         for folder, side in zip(map(Path, names), sides, strict=True):
             machine = side.rows[0].get("machine")
             for file in sorted(folder.glob("machine*.json")):
-                record_machine(out, records.parsed(file.read_bytes()))
+                record_machine(out, records.read_object(file))
             problems = records.read(folder / PROBLEMS)  # older ones do not name their machine
             problems = [row | {"machine": row.get("machine") or machine} for row in problems]
             records.append(out / PROBLEMS, *problems)

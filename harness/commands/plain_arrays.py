@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy.linalg as sla
@@ -165,7 +165,7 @@ def solve_dual(
     [2.0, 0.0]
     """
     refuse_not_positive("solve_dual", tolerance=tolerance)
-    Q = np.asfortranarray(_numbers("solve_dual", "Q", Q))
+    Q = _numbers("solve_dual", "Q", Q, order="F")
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1]:
         raise InputError.one("solve_dual", "Q.shape", Q.shape, "must be a square matrix")
     if not np.isfinite(Q).all():
@@ -284,12 +284,12 @@ def _results(session: SeriesSession, blocks: Iterable[LoadCases]) -> Iterator[Re
             yield from some
 
 
-def _numbers(where: str, name: str, value: ArrayLike) -> Matrix:
+def _numbers(where: str, name: str, value: ArrayLike, order: Literal["K", "F"] = "K") -> Matrix:
     """A copy, which a form may make read-only. Raises InputError unless it has real numbers alone."""
     try:
         if np.iscomplexobj(value):  # NumPy would leave the imaginary parts out
             raise TypeError("complex")
-        numbers = np.array(value, dtype=float)
+        numbers = np.array(value, dtype=float, order=order)
     except (TypeError, ValueError) as error:
         raise InputError.one(where, name, value, "must be real numbers") from error
     if np.ma.is_masked(value):

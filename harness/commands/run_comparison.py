@@ -15,6 +15,8 @@ from report.results.rows import frame
 from report.writers.comparison_report import Comparison, write
 
 MAX_SLOWDOWN = 1.3
+PAGE = "comparison.md"  # a folder with it has a comparison
+OUTPUTS = ("better.csv", "comparison.csv", "index.html", "solvers.csv", "worse.csv")
 
 
 def compare(
@@ -75,7 +77,7 @@ def compare(
             raise InputError.one(option, "limit", most, f"{least} or larger")
     if out is not None:
         refuse_unwritable(Path(out), [Path(name) / MEASUREMENTS for name in (str(old), *names)])
-        refuse_other_command(Path(out), "comparison.md", ("comparison.csv", "index.html"))
+        refuse_other_command(Path(out), PAGE, OUTPUTS)
     base, *sides = read_all(lambda name: read_side(name, key), [str(old), *names])
     comparisons = [_compared(base, side, max_digits_lost, max_slowdown) for side in sides]
     if out is not None:

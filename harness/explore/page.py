@@ -227,7 +227,7 @@ def outcome(answer: LiveAnswer, places: Matrix, limit_mm: float) -> str:
     untold = e is not None and not abs(gap - limit_mm) > e
     word = "cannot be told" if untold else "PASS" if gap <= limit_mm else "FAIL"
     colour = {"PASS": PASS, "FAIL": FAIL}.get(word, "#666666")
-    digits = max(6, digits_beside(limit_mm, gap))
+    digits = digits_beside(limit_mm, gap, least=6)
     above = np.count_nonzero(answer.gap > limit_mm)
     after = f"after {escape(answer.stage)}: " if answer.stage else ""
     return (

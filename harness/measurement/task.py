@@ -56,7 +56,7 @@ def run_task(task: Task, answers: Path) -> TaskResult:
     Raises InputError if the file of the scene is another than that on which they are judged.
     """
     source = task.batch[0].source
-    if task.scene_key not in ("", read_scene(source).key):
+    if task.scene_key and read_scene(source).key != task.scene_key:
         allowed = "the file that the run has read: it has changed since, or is another on this worker"
         raise InputError.one(source, "scene", "another", allowed)
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms

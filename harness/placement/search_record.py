@@ -12,7 +12,7 @@ from harness.placement.session import FastenerStudy
 from harness.results.provenance import stamp
 from problems.forms.assembly import Matrix
 from problems.storage import digest
-from report.document.numbers import counted, on_its_side, position
+from report.document.numbers import beside, counted, position, raised, significant
 
 
 def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
@@ -79,16 +79,19 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     else:
         leave = "leaves" if len(step.plan) == 1 else "leave"
         fasteners = f"{which}{counted(len(step.plan), 'fastener')}"
-        most = on_its_side(step.gap_mm, goal.limit_mm or 0.0)
-        words = f"{fasteners} {leave} {most} mm in the one load case"
+        gap, limit = step.gap_mm, goal.limit_mm
+        shown = significant(raised(gap)) if limit is None else beside(limit)(gap)
+        words = f"{fasteners} {leave} {shown} mm in the one load case"
     if goal.limit_mm is None:
         return f"{words}, proven.", True
     if step.gap_mm <= goal.limit_mm:
         return f"PASS: {words}, proven.", True
     worst = step.worst if sample is None else sample.numbers[step.worst]
+    if step.gap_mm == inf:
+        return f"FAIL: {words}; nothing is proven of case {worst}.", False
     at = position(nodes[step.outcome.contact[step.worst]], nodes)
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
-        words += f"; in {share} it is {on_its_side(step.gap_mm, goal.limit_mm)} mm"
+        words += f"; in {share} it is {beside(goal.limit_mm)(step.gap_mm)} mm"
     more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
     return f"FAIL: {words}, {more}; case {worst} is the worst, at {at}.", False

@@ -120,6 +120,16 @@ def parsed(text: str | bytes) -> Row:
     return content
 
 
+def read_object(path: Path) -> Row:
+    """The JSON object in a file. Raises InputError if it is none."""
+    try:
+        return parsed(regular_file(path, "content", ROWS_MIB).read_bytes())
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError.one(path, "content", str(error)[:80], "delete it, and run again") from error
+
+
 def rewrite(path: Path, rows: list[Row]) -> None:
     """Replace the rows of the file, atomically."""
     replace_text(path, "".join(to_line(row) + "\n" for row in rows))

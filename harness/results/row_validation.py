@@ -7,13 +7,11 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from problems.errors import Fault, InputError
-from problems.input.bounded_types import regular_file
 
 from . import records
 from .records import Row
 from .schema import FIELDS, PROBLEM_FIELDS, Kind
 
-MAX_MIB = 1024  # of a file beside the rows
 MAX_FAULTS = 20  # named at once
 TYPES: dict[Kind, Any] = {"number": float, "text": str, "flag": bool, "object": dict[str, Any]}
 
@@ -70,13 +68,15 @@ def refuse_unreadable(directory: Path) -> None:
     measured_rows(directory)
     problems = directory / "problems.jsonl"
     refuse_wrong_kinds(problems, records.read(problems), PROBLEM)
-    faults = []
+    faults = list[Fault]()
     for path in sorted([*directory.glob("machine*.json"), *directory.glob("scenes/*.npz")]):
         try:
             if path.suffix == ".npz":
                 records.read_arrays(path)
             else:
-                records.parsed(regular_file(path, "content", MAX_MIB).read_bytes())
+                records.read_object(path)
+        except InputError as error:
+            faults += error.faults
         except ValueError as error:
             faults.append(Fault(str(path), "content", str(error)[:80], "delete it, and run again"))
     if faults:

@@ -21,7 +21,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
-from report.document.numbers import beside, counted, position, upwards
+from report.document.numbers import beside, counted, position, proven_to
 
 from .mesh_error import MeshError
 from .solution import Solution
@@ -136,7 +136,7 @@ def check_series(directory: Path, allowed_mm: float) -> dict[str, Any]:
         kept = free.answered - len(free.cases) - free.undecided
         sure += f"; {share_in_words(kept, drawn, drawn - len(free.cases) - kept)}"
     kind, said = "" if result.undecided or answered < count else "pass", [f"{sure}."]
-    untold = {f"gaps are proven only to {upwards(result.uncertainty_mm)} mm": result.undecided}
+    untold = {f"gaps are {proven_to(result.uncertainty_mm)}": result.undecided}
     untold["there is no answer"] = count - answered
     for why, some in untold.items():
         if some:

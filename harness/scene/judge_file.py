@@ -22,7 +22,7 @@ from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import reading
 from problems.input.tables import Cells, doubt, is_stray, number
 from problems.model.scene import JointScene
-from report.document.numbers import position, upwards
+from report.document.numbers import position, proven_to, upwards
 
 LARGEST_MIB = 1024
 #: The vectors of an answer, by their names in a file.
@@ -68,7 +68,7 @@ def judge_file(
     text = f"{judgement.verdict.capitalize()} {limit:.3g} mm."
     if judgement.verdict == "cannot_be_judged":
         how = problem.reference.route
-        text = f"Cannot be judged: the reference is proven only to {upwards(bound)} mm ({how})."
+        text = f"Cannot be judged: the reference is {proven_to(bound)} ({how})."
     console.print(text, style=STYLES[judgement.verdict])
     return CODES[judgement.verdict]
 

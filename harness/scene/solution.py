@@ -48,7 +48,7 @@ class Solution:
     judgement : Judgement
         The judge's figures.
     error_bound_mm : float
-        Proven bound on max|x − x*|, mm, for the exact answer x*.
+        Proven bound on max|x − x*|, mm, for the exact answer x*; in stages, at the locked approaches.
     notes : tuple of str
         Sentences on numbers of the user that reading has rounded or symmetrised.
     method : str

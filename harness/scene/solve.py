@@ -25,8 +25,14 @@ from .validate import print_unusual
 
 TOLERANCE = 1e-9  # of a named solver, by default
 PAGE = "answer.md"  # a folder with it has an answer
+TABLES = ("contacts", "exceeding", "fasteners", "nodes", "stages", "stress")
+PICTURES = ("deformed", "displacement", "forces", "gap", "history", "section", "stage-gaps", "stress")
 #: Files of an answer that a folder without one may have from elsewhere.
-OUTPUTS = ("contacts.csv", "fasteners.csv", "index.html", "nodes.csv", "solution.npz", "stress.csv")
+OUTPUTS = (
+    *(f"{name}.csv" for name in TABLES),
+    *(f"{name}.png" for name in PICTURES),
+    *("answer.pdf", "index.html", "solution.npz", "solution.vtu", "stress.vtu"),
+)
 
 
 def solve_into(

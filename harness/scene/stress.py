@@ -31,7 +31,7 @@ from problems.model.positions import Positions
 from problems.model.scene import JointScene, Scene
 from problems.model.stress import PartStress, part_stress
 from problems.stiffness import gamma
-from report.document.numbers import digits_beside, upwards
+from report.document.numbers import beside, proven_to
 
 from .mesh_error import MeshError
 from .solution import Solution
@@ -103,9 +103,9 @@ def stress_record(assembly_stress: Stresses, mesh: MeshError | None, allowed: fl
         untold = {} if allowed is None else {"allowed": allowed, "exceeded": None}
         return untold | {"kind": "", "said": "Forces at points act near all elements: no stress is told"}
     at = f"{largest['part']}, on {largest['face']}, x = {largest['x']:.4g} mm, y = {largest['y']:.4g} mm"
-    digits = digits_beside(0.0 if allowed is None else allowed, largest["von_mises"])
-    said = f"largest von Mises stress {largest['von_mises']:.{digits}g} N/mm², {at}"
-    said += f"; proven to {upwards(largest['error'])}"
+    shown = beside(0.0 if allowed is None else allowed)(largest["von_mises"])
+    said = f"largest von Mises stress {shown} N/mm², {at}"
+    said += f"; {proven_to(largest['error'], 'N/mm²')}"
     grid = None if mesh is None else mesh.stress
     said += ", mesh error not known" if grid is None else f", mesh error about {grid:.1g} N/mm²"
     if none := [part.part for part in assembly_stress.parts if part.near_force.all()]:  # or no point at all

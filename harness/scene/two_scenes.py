@@ -26,7 +26,7 @@ from problems.scene_files import read_scene
 
 FOLDERS = ["first", "second"]
 PAGE = "comparison.md"  # a folder with it has a comparison
-OUTPUTS = ("contacts.csv", "fasteners.csv", "index.html", "pairs.csv")
+OUTPUTS = ("contacts.csv", "difference.png", "fasteners.csv", "gaps.png", "index.html", "pairs.csv")
 SHIFT = 0.05  # of the junction's longer side, by which the corners of two meshes of it may differ
 
 

@@ -131,7 +131,7 @@ def ended(job: Job, case: int, end: Row) -> Row:
 
 def refuse_other_matrices(job: Job) -> None:
     """Raise InputError if the files of matrices are others than those that the series began with."""
-    if job.scene_key not in ("", job.scene.key):
+    if job.scene_key and job.scene.key != job.scene_key:
         allowed = "those that the series has read: they have changed since, or are others on this worker"
         raise InputError.one(job.scene.source_of("K"), "matrices", "others", allowed)
 

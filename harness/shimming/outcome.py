@@ -15,7 +15,7 @@ from harness.scene.mesh_error import estimated, mesh_record
 from harness.scene.solution import solve
 from problems.model.fastener_forces import fastener_forces
 from problems.scene_files import read_scene
-from report.document.numbers import counted, on_its_side, position, upwards
+from report.document.numbers import beside, counted, position, proven_to
 
 from .patches import BORDERS
 from .study import ShimStudy
@@ -29,8 +29,8 @@ def sentence_of(result: SearchOutcome, goal: Goal, study: ShimStudy) -> tuple[st
     least = step or min(result.steps, key=lambda step: step.gap_mm)
     figures = least.outcome.further[least.worst]
     gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
-    most = "".join(f", {on_its_side(value, limit)} {unit}" for value, limit, unit in more if limit < inf)
-    largest = on_its_side(gaps.max(), goal.limit_mm or 0.0)
+    most = "".join(f", {beside(limit)(value)} {unit}" for value, limit, unit in more if limit < inf)
+    largest = beside(goal.limit_mm or 0.0)(gaps.max())
     leave = f"{largest} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
     if step is None:
         words = "no shims of the stock are found with which all limits are kept; the best tried leave"
@@ -89,6 +89,6 @@ def solver_statements(path: Path, shims: int, allowed_mm: float) -> dict[str, An
     answers = [solve(without), solve(after)]
     check = check_answer(answers[1], allowed_mm, [], mesh := estimated(answers[1]))
     pairs = zip(*(fastener_forces(answer.problem.scene, answer.x) for answer in answers), strict=True)
-    sure = [f"Solver: gaps proven to {upwards(check['uncertainty_mm'])} mm", mesh_record(mesh)["said"]]
+    sure = [f"Solver: gaps {proven_to(check['uncertainty_mm'])}", mesh_record(mesh)["said"]]
     sure.append(f"Scan: {check.get('beyond_scan', 'no contact is beyond measured points')}")
     return {"sure": sure, "forces": [old | {"with_shims_N": new["force_N"]} for old, new in pairs]}

@@ -33,7 +33,7 @@ from harness.placement.candidates import Plan
 from harness.placement.plan_search import DIGITS, ESTIMATED, MORE_CASES, PlanSearch, Step
 from harness.placement.session import Outcome
 from problems.forms.assembly import Matrix
-from report.document.numbers import on_its_side
+from report.document.numbers import beside
 
 from .study import ShimStudy
 
@@ -65,7 +65,7 @@ class ShimSearch(PlanSearch):
         return [replace(one, largest=tuple(map(used, one.further))) for one in made]
 
     def used(self, step: Step) -> str:
-        share = f"{on_its_side(100 * step.gap_mm / self.limit_mm, 100.0)} % of the limits"
+        share = f"{beside(100.0)(100 * step.gap_mm / self.limit_mm)} % of the limits"
         return super().used(step) if min(self.study.limits) == inf else share
 
     def cost(self, plan: Plan) -> tuple[float, float]:

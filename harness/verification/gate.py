@@ -27,7 +27,7 @@ from problems.errors import InputError
 from problems.forms import form_family
 from problems.input.bounded_types import Positive
 from report.document.escape import markdown, quoted
-from report.document.numbers import counted, out_of, upwards
+from report.document.numbers import counted, out_of, proven_to
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
@@ -228,8 +228,7 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
         case "no_answer":
             why = f"{row['answer']} {UNREADABLE}"
         case "cannot_be_judged":
-            known = f"the reference is known only to {upwards(bound, 1)} mm"
-            why = f"{known}, not to {REFERENCE_SHARE * limit:.0e}"
+            why = f"the reference is {proven_to(bound)}; {REFERENCE_SHARE * limit:.0e} mm is needed"
         case "outside":
             why = f"{judgement.displacement_error_mm:.3e} mm from the reference"
         case _:

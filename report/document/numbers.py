@@ -63,19 +63,25 @@ def without_rounding(least: float, largest: float) -> float:
     return 0.0 if abs(least) <= ROUNDING * abs(largest) else least
 
 
-def digits_beside(limit: float, value: float) -> int:
-    """How many digits show a value on its side of a limit: three, or as many more as it takes."""
-    return next(k for k in range(3, 18) if (float(f"{value:.{k - 1}e}") > limit) == (value > limit))
-
-
-def on_its_side(value: float, limit: float) -> str:
-    """0.10004 beside 0.1: a value, maybe infinite, with the digits that show it on its side of a limit."""
-    return f"{value:.{digits_beside(limit, value)}g}"
+def digits_beside(limit: float, value: float, least: int = 3) -> int:
+    """How many digits, at least so many, show a value on its side of a limit."""
+    return next(k for k in range(least, 18) if (float(f"{value:.{k - 1}e}") > limit) == (value > limit))
 
 
 def beside(limit: float) -> Callable[[object], str]:
-    """Shows values with the digits that show them on their sides of a limit."""
-    return lambda value: significant(value, digits_beside(limit, as_number(value) or 0.0))
+    """Shows values with the digits that show them on their sides of a limit, and infinite ones as inf."""
+
+    def shown(value: object) -> str:
+        digits = digits_beside(limit, as_number(value) or 0.0)
+        return "inf" if value == math.inf else significant(value, digits)
+
+    return shown
+
+
+def proven_to(error: object, unit: str = "mm") -> str:
+    """'proven to 3.3e-16 mm', or 'not proven' without an error or with an infinite one."""
+    number = as_number(error)
+    return "not proven" if number is None else f"proven to {upwards(number)} {unit}"
 
 
 def power(value: object, digits: int = 3) -> str:

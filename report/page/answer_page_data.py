@@ -4,15 +4,14 @@ import pandas as pd
 
 from report.document.blocks import number, word
 from report.document.numbers import (
-    as_number,
     beside,
     coordinate,
     listed,
     out_of,
     position,
+    proven_to,
     raised,
     significant,
-    upwards,
     whole,
     without_rounding,
 )
@@ -107,9 +106,7 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
     near = ", closer to the limit than the mesh can tell" if check.get("closer_than_grid_mm") else ""
     near += f"; {check['beyond_scan']}" if "beyond_scan" in check else ""
     if check["exceeded"] is None:
-        proven = as_number(check["uncertainty_mm"])
-        known = f"gaps are proven to {upwards(proven)} mm" if proven is not None else "no error is proven"
-        kind, verdict = "", f"CANNOT BE TOLD: {limit}, {known}"
+        kind, verdict = "", f"CANNOT BE TOLD: {limit}, gaps are {proven_to(check['uncertainty_mm'])}"
     elif check["exceeded"]:
         larger = f"at {out_of(len(check['contacts']), record['m'], 'contact')}"
         where = f"{larger}, {check['share']:.1%} of the junction, between {', '.join(check['pairs'])}"

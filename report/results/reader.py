@@ -120,8 +120,8 @@ class Results:
 
 
 def read(directory: Path) -> Results:
-    """Read a directory; damaged files have been refused by row_validation.py. Raises FileNotFoundError if it
-    has no measurements.jsonl; its other files may be missing.
+    """Read a directory, whose suite.toml is no damaged one. Raises FileNotFoundError if it has no
+    measurements.jsonl, InputError naming a damaged file; its other files may be missing.
     """
     path = directory / records.MEASUREMENTS
     if not path.is_file():
@@ -131,7 +131,7 @@ def read(directory: Path) -> Results:
     old = quoted(records.read(directory / records.OUTDATED))
     plan = directory / "suite.toml"
     suite = quoted(tomllib.loads(plan.read_text("utf-8-sig"))) if plan.is_file() else {}
-    facts = [quoted(records.parsed(file.read_bytes())) for file in sorted(directory.glob("machine*.json"))]
+    facts = [quoted(records.read_object(file)) for file in sorted(directory.glob("machine*.json"))]
     machines = {str(fact.get("machine", "")): fact for fact in facts}
     rows = frame(measured)
     logs = map(plain, rows["log"])

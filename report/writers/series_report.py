@@ -85,8 +85,12 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
 def _largest(series: Series) -> str:
     largest = series.cases["max_gap_mm"]
     worst = int(series.cases["case"].to_numpy()[largest.to_numpy().argmax()])
-    limit = (series.facts.get("allowed_gap") or {}).get("allowed_mm", 0.0)
-    return f"{beside(limit)(largest.max())} mm, in case {worst}"
+    return f"{beside(_limit(series))(largest.max())} mm, in case {worst}"
+
+
+def _limit(series: Series) -> float:
+    """The allowed gap, mm; infinite without one."""
+    return float((series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf))
 
 
 def _summary(series: Series) -> Table:
@@ -121,7 +125,8 @@ def _statistics(series: Series) -> Table:
     table = figures.quantile(QUANTILES).T.rename(columns="q{:g}".format)
     table = table.assign(figure=list(GAPS.values()), mean=figures.mean(), largest=figures.max())
     columns = [word("mm", "figure"), number("mean", "mean")]
-    columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES] + [number("largest", "largest")]
+    columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES]
+    columns.append(number("largest", "largest", beside(_limit(series))))
     return Table("statistics", "*Quantiles over the cases.*", table, columns)
 
 
@@ -136,10 +141,10 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
     values = dict(zip([*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"], maps, strict=True))
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
     quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
-    limit = larger_than((series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf), gap)
-    worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), [limit], series.marks)
+    larger = larger_than(_limit(series), gap)
+    worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), [larger], series.marks)
     caption = "*The remaining gap at each contact: quantiles over the cases.*"
-    of_worst = f"*The worst case, number {case}, with a largest gap of {significant(gap.max())} mm.*"
+    of_worst = f"*The worst case: a largest gap of {_largest(series)}.*"
     return [
         Figure("quantile-maps", caption, map_sheet(quantiles, 3)[0], places.assign(**values)),
         Figure("worst-case", of_worst, map_sheet([worst], 1)[0], places.assign(gap_mm=gap)),

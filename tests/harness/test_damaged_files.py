@@ -195,6 +195,14 @@ def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, copy
     assert f"measurements.jsonl: line 1: {name}" in wrong_usage("run", copy, "--out", copy)
 
 
+def test_a_run_names_the_damaged_file_of_another_machine(copy: Path) -> None:
+    """Which it does not write anew, as it does its own; its report would lack that machine."""
+    (copy / "machine-1.json").write_bytes(b"{")
+    done = harness("run", copy, "--out", copy)
+    assert done.exit_code == 2
+    assert "machine-1.json: content" in done.output
+
+
 @pytest.mark.usefixtures("blank_pictures")
 def test_text_among_the_arrays_of_a_scene_is_left_out(copy: Path) -> None:
     (path,) = (copy / "scenes").iterdir()

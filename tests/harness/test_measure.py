@@ -192,17 +192,29 @@ def test_an_orphan_that_is_in_no_list_yet_is_killed_too(monkeypatch: pytest.Monk
     assert killed == [11, 12]
 
 
-def test_another_scene_than_that_of_the_reference_is_refused(folder: Path) -> None:
-    """It has changed meanwhile, or is older on a worker: right answers would be judged as wrong ones."""
+def measurement(folder: Path) -> Measurement:
     entry = SolverEntry(name="gi")
     suite = Suite(name="s", scenes=["tiny"], solver=[entry])
     asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
-    m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
-    task = Task([m], Description(["dual"], "1", "code"), "of another file")
+    return Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
+
+
+def test_another_scene_than_that_of_the_reference_is_refused(folder: Path) -> None:
+    """It has changed meanwhile, or is older on a worker: right answers would be judged as wrong ones."""
+    task = Task([measurement(folder)], Description(["dual"], "1", "code"), "of another file")
     with pytest.raises(InputError, match="it has changed since, or is another on this worker"):
         run_task(task, folder)
     with pytest.raises(InputError, match="the file that the run has read"):
         run_task_on_worker(task)
+
+
+def test_a_scene_without_files_is_not_made_again_to_be_compared(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The key of a rung takes all its matrices."""
+    monkeypatch.setattr("harness.measurement.task.read_scene", None)  # not called
+    task = Task([measurement(folder)], Description(["primal"], "1", "code"))
+    assert run_task(task, folder).reports[0]["status"] == "unsupported"
 
 
 def test_a_full_disk_is_not_the_solvers_fault(folder: Path) -> None:

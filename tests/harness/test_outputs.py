@@ -9,6 +9,8 @@ from strip_scene import write_strip
 
 from harness.results.records import PLANS
 from harness.results.schema import SERIES
+from harness.scene.solve import OUTPUTS
+from report.writers.answer_report import CAPTIONS
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
 COMMANDS = [
@@ -58,8 +60,12 @@ def test_an_answer_replaces_no_file_that_its_scene_names(tmp_path: Path) -> None
         ("place strip.toml --count 1 --cases 2 --share 1", "plan/scan.csv"),
         ("tolerance strip.toml --key initial_gap.mean --range 0.1:0.2 --allow-gap 1", "shares.csv"),
         ("solve strip.toml", "nodes.csv"),
+        ("solve strip.toml", "exceeding.csv"),
+        ("solve strip.toml", "gap.png"),
         ("solve strip.toml strip.toml", "contacts.csv"),
+        ("solve strip.toml strip.toml", "gaps.png"),
         ("compare a b", "index.html"),
+        ("compare a b", "solvers.csv"),
         ("export strip.toml --form dual", "P.mtx"),
         ("run gate --solver gi --scene gallery/three-part-stack", "report/scan.csv"),
         ("run gate --solver gi --scene gallery/three-part-stack", "suite.toml"),
@@ -79,6 +85,10 @@ def test_a_file_that_no_command_wrote_is_left_alone(
     assert f"has {Path(name).parts[0]} of another command: name another directory" in told
     assert sorted(tmp_path.rglob("*")) == before
     assert file.read_text() == "mine"
+
+
+def test_every_picture_of_an_answer_is_among_its_outputs() -> None:
+    assert {f"{name}.png" for name in CAPTIONS} < {*OUTPUTS}
 
 
 @pytest.mark.parametrize("command", ["series strip.toml --cases 1", "place strip.toml --count 1 --cases 2"])

@@ -28,7 +28,7 @@ from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, 
 from harness.placement.fresh_cases import Cases, Goal, Sample, SearchOutcome, search_in_rounds
 from harness.placement.plan_search import Step
 from harness.placement.search import Search
-from harness.placement.search_record import record_of
+from harness.placement.search_record import record_of, sentence_on
 from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question, answer
 from harness.planning.form_choice import Choice
 from harness.results import series_file
@@ -272,6 +272,24 @@ def test_a_record_tells_cases_beyond_the_limit_from_those_not_proven(strip: Path
     found = SearchOutcome([step], range(3), step, [], [])
     best = record_of(study, (), holes, Goal(0.5, 1.0), found, np.zeros((3, 2)))["best"]
     assert (best["failing"], best["unproven"]) == ([1], [0])
+
+
+def test_a_gap_that_is_proven_without_a_limit_is_rounded_upwards() -> None:
+    goal, step = Goal(None, 0.95, 1), Step(((0.0, 0.0),), 0.12041, Outcome((0.12041,), (0,), (0.1,)))
+    sample = Sample(step, range(20), "fresh cases", 19, (0.8, 0.99), "fastener")
+    assert sample.sentence(goal).startswith("1 fastener keeps 0.121 mm in 95.0 % of 20 fresh cases")
+    said, _ = sentence_on(SearchOutcome([step], range(1), step, [], [step]), goal, np.zeros((1, 2)))
+    assert said == "1 fastener leaves 0.121 mm in the one load case, proven."
+
+
+def test_a_case_of_which_nothing_is_proven_is_named() -> None:
+    """Not as infinitely much more than allowed."""
+    step = Step(((0.0, 0.0),), np.inf, Outcome((0.1, np.inf), (0, 0), (0.1, 0.1)))
+    sample = Sample(step, range(7, 9), "fresh cases", 1, (0.1, 0.9), "fastener")
+    found = SearchOutcome([step], range(2), step, [sample], [step])
+    said, passed = sentence_on(found, Goal(0.5, 1.0), np.zeros((1, 2)))
+    assert said.endswith("of 2 fresh cases (95 % interval 10.0 to 90.0 %); nothing is proven of case 8.")
+    assert not passed
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])

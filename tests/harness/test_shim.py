@@ -410,6 +410,16 @@ def test_wrong_questions_are_refused(strip: Path, tmp_path: Path, words: Any, sa
     assert not (tmp_path / "out").exists()
 
 
+def test_a_limit_on_a_stress_that_no_place_tells_is_refused(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before the search, in which no plan could keep it."""
+    monkeypatch.setattr("harness.shimming.shim_run.largest_of", lambda *_: inf)
+    done = shim(strip, tmp_path / "out", "--allow-stress", 50)
+    assert done.exit_code == 2
+    assert "left out: forces at points act near all elements" in " ".join(done.output.split())
+
+
 def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path: Path) -> None:
     """The contacts on the border of both would be filled twice."""
     shimmed = tmp_path / "shimmed.toml"

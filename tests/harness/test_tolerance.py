@@ -216,13 +216,14 @@ def test_cases_without_an_answer_are_counted(monkeypatch: pytest.MonkeyPatch, tm
 
 
 @pytest.mark.usefixtures("without_pictures")
-def test_without_answers_at_both_ends_nothing_is_judged(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize("figures", [{}, {"max_gap_mm": 0.5}], ids=["no answer", "no error known"])
+def test_where_nothing_is_known_at_both_ends_nothing_is_judged(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, figures: dict[str, float]
 ) -> None:
     """The key is not to blame."""
     monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
     monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": 2})
-    monkeypatch.setattr(series_file, "rows", lambda _: [{"case": 0}, {"case": 1}])
+    monkeypatch.setattr(series_file, "rows", lambda _: [{"case": k} | figures for k in (0, 1)])
     words = "--key", SD, "--range", "0.1:0.2", "--allow-gap", 1.0, "--cases", 2
     done = harness("tolerance", write_strip(tmp_path), *words, "--out", tmp_path / "out")
     assert done.exit_code == 3

@@ -198,6 +198,12 @@ def test_a_stress_that_overflows_passes_no_limit(monkeypatch: pytest.MonkeyPatch
         assert largest_of(read_scene("gallery/padded-panel"), np.zeros(1)) == np.inf  # type: ignore[arg-type]
 
 
+def test_a_stress_without_a_known_error_is_not_proven() -> None:
+    record = stress_record(made((1.0, 0.0, 0.0), error=np.inf), None, 100.0)
+    assert record["said"].startswith("CANNOT BE TOLD: limit 100 N/mm²; largest")
+    assert "; not proven, mesh error not known" in record["said"]
+
+
 def test_a_part_of_which_no_stress_is_told_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forces at points act near all of its elements: a PASS is of the other part alone."""
     (told,), (near,) = (made((stress, 0.0, 0.0)).parts for stress in (1.0, 900.0))

@@ -11,7 +11,17 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from report.document.blocks import Table, number, word
-from report.document.numbers import beside, coordinate, extent, position, raised, significant, upwards
+from report.document.numbers import (
+    beside,
+    coordinate,
+    digits_beside,
+    extent,
+    position,
+    proven_to,
+    raised,
+    significant,
+    upwards,
+)
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.page.answer_page_data import headline
@@ -199,6 +209,25 @@ def test_no_bound_is_rounded_down_or_far() -> None:
 def test_a_value_is_shown_on_its_side_of_a_limit() -> None:
     said = [beside(0.05)(value) for value in (0.0512, 0.05004, 0.05, 0.04999)]
     assert said == ["0.0512", "0.05004", "0.0500", "0.0500"]
+    assert [beside(0.05)(value) for value in (np.inf, None, np.nan)] == ["inf", "–", "–"]
+
+
+def test_more_digits_are_on_the_side_of_a_limit_too() -> None:
+    """Three digits round 0.1238564 away from the limit, six to it."""
+    assert [digits_beside(0.123856, 0.1238564, least) for least in (3, 6)] == [3, 7]
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (3.21e-9, "proven to 3.3e-09 N"),
+        (0.0, "proven to 0.0e+00 N"),
+        (np.inf, "not proven"),
+        (None, "not proven"),
+    ],
+)
+def test_what_has_no_finite_error_is_not_proven(error: float | None, said: str) -> None:
+    assert proven_to(error, "N") == said
 
 
 def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:
@@ -213,7 +242,7 @@ def test_gaps_without_a_proven_error_are_told_without_a_figure() -> None:
     record, arrays = answer(3)
     check = {"allowed_mm": 0.1, "exceeded": None, "uncertainty_mm": None}
     text = headline(record | {"allowed_gap": check}, arrays)["text"]
-    assert text.startswith("CANNOT BE TOLD: limit 0.1 mm, no error is proven; the largest gap")
+    assert text.startswith("CANNOT BE TOLD: limit 0.1 mm, gaps are not proven; the largest gap")
 
 
 def test_contacts_without_known_forces_are_not_said_to_be_open() -> None:

@@ -10,10 +10,11 @@ import pytest
 from synthetic_series import CASES, M, made
 
 from harness.results import series_file
-from report.document.blocks import Figure
+from report.document.blocks import Figure, records
+from report.document.numbers import significant
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
 from report.writers import place_report
-from report.writers.series_report import _sheet, _swept, write
+from report.writers.series_report import _maps, _sheet, _statistics, _swept, write
 from report.writers.sheet import Sheet
 
 
@@ -99,6 +100,18 @@ def test_one_unknown_error_leaves_the_exactness_untold(tmp_path: Path) -> None:
         errors[0] = first
         cases = series.cases.assign(gap_error_mm=errors)
         assert said in _sheet(replace(series, cases=cases), tmp_path, tmp_path).sure[0]
+
+
+def test_the_largest_gap_is_on_its_side_of_the_limit_in_tables_and_captions(tmp_path: Path) -> None:
+    """Where three digits are on the other side."""
+    largest = float(made(tmp_path).max())
+    allowed = largest * (1 + 1e-6 * np.sign(float(significant(largest)) - largest))
+    series = read(tmp_path)
+    series = replace(series, facts=series.facts | {"allowed_gap": {"allowed_mm": allowed}})
+    table, (_, worst) = _statistics(series), _maps(series, quantile_maps(series))
+    shown = table.columns[-1].show(records(table.data)[0])
+    assert (float(shown) > allowed) == (largest > allowed)
+    assert f"a largest gap of {shown} mm, in case" in worst.caption
 
 
 @pytest.mark.usefixtures("without_pictures")
