@@ -17,6 +17,7 @@ from problems.model.interface import on_junction
 from problems.model.positions import MOST
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import stage_scenes
+from problems.model.stages import SLICE
 
 Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
@@ -43,7 +44,7 @@ class MovableFasteners:
     @classmethod
     def of(cls, scene: Scene) -> "MovableFasteners":
         """Raises InputError as `movable_fasteners` does, if two are at one place, or if a stage has only some
-        of them.
+        of them, or names them by their numbers.
         """
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
@@ -51,6 +52,10 @@ class MovableFasteners:
             if (acting := list(last.effects_of(Fasteners))) and acting != fasteners:
                 allowed = f"all points at once; in stage {name} some act: they change places"
                 raise InputError.one(f"scene {scene.name}", "fasteners", [fasteners[0].name], allowed)
+        named = [one for stage in scene.stages for one in (*stage.on, *stage.off)]
+        if parts := [one for one in named if (some := SLICE.fullmatch(one)) and some[1] == fasteners[0].name]:
+            allowed = "its name alone: a plan may have another number of points"
+            raise InputError.one(f"scene {scene.name}", "fasteners in stages", parts, allowed)
         marks = np.concatenate([each.marks(scene.joint) for each in fasteners])
         if twice := _twice(marks, f"scene {scene.name}"):
             raise InputError(twice)
@@ -60,8 +65,8 @@ class MovableFasteners:
         """The holes that fasteners may go into, and their names if the CSV has a column `name`.
 
         holes : a pattern `4x32`, rows × columns of equal cells of the junction, or the path of a CSV with
-        columns x and y, mm, read by `options`; None: where the scene's fasteners are. Raises InputError if a
-        hole is off the parts, or there twice.
+        columns x and y, mm, with the headings of `options`; None: where the scene's fasteners are. Raises
+        InputError if a hole is off the parts, or there twice.
         """
         if holes is None:
             return self.current, {}
@@ -72,7 +77,7 @@ class MovableFasteners:
                 raise InputError.one("--candidates", "holes", holes, allowed)
             points, faults, labels = grid(self.bare, rows, columns), [], []
         else:
-            table = read_columns(Path(holes), ("x", "y"), options)
+            table = read_columns(Path(holes), ("x", "y"), replace(options, missing=()))
             points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.words["name"]
         points = points.round(DIGITS)  # as plans have them: rounding may leave the parts
         faults = faults + self.faults(points, holes)
@@ -86,7 +91,7 @@ class MovableFasteners:
         on = joint.covers(self.fastener.parts(joint), points)
         faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in np.flatnonzero(~on)]
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
-        for installed in () if self.scene.stages else self.bare.effects_of(SpringEffect):
+        for installed in self.bare.effects_of(SpringEffect) if len(points) and not self.scene.stages else ():
             faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
         return faults + _twice(points, source)
 

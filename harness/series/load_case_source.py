@@ -91,7 +91,7 @@ class GapCases:
 
     def faults(self, sweep: Sequence[str] = (), table: bool = False) -> list[Fault]:
         """A fault for each number out of range, if the cases come from more than one source, or if options of
-        tables have none. table : whether another table is read by them.
+        tables have none. table : whether another one has `columns`.
         """
         names = (*("seed",)[bool(self.scans) :], "mean", "sd", "correlation_length", "around")
         random = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
@@ -103,7 +103,7 @@ class GapCases:
         if self.options.columns and not (self.around or self.scans or table):
             allowed = "those of --around and --scans; the columns of --gaps are the contacts, in their order"
             faults.append(Fault("--columns", "headings", ", ".join(self.options.columns), allowed))
-        if self.options.missing and not (self.around or self.scans or self.gaps or table):
+        if self.options.missing and not (self.around or self.scans or self.gaps):
             marks = ", ".join(map(str, self.options.missing))
             faults.append(Fault("--missing", "marks", marks, "those of --around, --scans or --gaps"))
         if self.contributors is not None and (self.count is not None or not self.random):

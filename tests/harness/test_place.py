@@ -36,6 +36,7 @@ from harness.results.records import PLANS
 from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.build import load_case
 from problems.errors import InputError
+from problems.input.tables import TableOptions
 from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
@@ -649,13 +650,31 @@ def test_scenes_whose_fasteners_cannot_move(tmp_path: Path, fasteners: str, said
         MovableFasteners.of(read_scene(str(path)))
 
 
-def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("holes", "said"),
+    [
+        ("x,y\n10,10\n30,10\n", r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"),
+        ("x,y\n", r"holes\.csv: rows = 0: at least one row"),
+        (None, r"holes\.csv: file = 'No such file"),
+    ],
+)
+def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path, holes: str | None, said: str) -> None:
+    """Of a table without a hole that is said alone."""
     installed = '[[effect]]\nkind = "installed_fasteners"\npoints = [[30.0, 10.0]]\n'
     scene = tmp_path / "scene.toml"
     scene.write_text(two_parts() + GAP.replace("60.0", "50.0") + FASTENERS + installed)
-    (tmp_path / "holes.csv").write_text("x,y\n10,10\n30,10\n")
-    with pytest.raises(InputError, match=r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"):
+    if holes is not None:
+        (tmp_path / "holes.csv").write_text(holes)
+    with pytest.raises(InputError, match=said):
         MovableFasteners.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
+
+
+def test_a_mark_of_missing_gaps_leaves_out_no_hole(strip: Path, tmp_path: Path) -> None:
+    """It marks a gap, and a table of holes has none."""
+    (tmp_path / "holes.csv").write_text("x,y\n10,0\n20,10\n")
+    marked, movable = TableOptions(missing=(0,)), MovableFasteners.of(read_scene(str(strip)))
+    assert movable.candidates(str(tmp_path / "holes.csv"), marked)[0] == ((10.0, 0.0), (20.0, 10.0))
+    assert [fault.where for fault in GapCases(options=marked).faults(table=True)] == ["--missing"]
 
 
 def test_holes_are_checked_where_plans_have_them(strip: Path, tmp_path: Path) -> None:
