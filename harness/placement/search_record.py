@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from math import inf
+from math import inf, isfinite
 from typing import Any
 
 from harness.placement.candidates import Plan
@@ -82,7 +82,7 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
         most = on_its_side(step.gap_mm, goal.limit_mm or 0.0)
         words = f"{fasteners} {leave} {most} mm in the one load case"
     if goal.limit_mm is None:
-        return f"{words}, proven.", True
+        return f"{words}, {'' if isfinite(step.gap_mm) else 'not '}proven.", True
     if step.gap_mm <= goal.limit_mm:
         return f"PASS: {words}, proven.", True
     worst = step.worst if sample is None else sample.numbers[step.worst]

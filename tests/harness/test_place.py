@@ -28,7 +28,7 @@ from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, 
 from harness.placement.fresh_cases import Cases, Goal, Sample, SearchOutcome, search_in_rounds
 from harness.placement.plan_search import Step
 from harness.placement.search import Search
-from harness.placement.search_record import record_of
+from harness.placement.search_record import record_of, sentence_on
 from harness.placement.session import FastenerStudy, Outcome, PlanSession, Question, answer
 from harness.planning.form_choice import Choice
 from harness.results import series_file
@@ -272,6 +272,13 @@ def test_a_record_tells_cases_beyond_the_limit_from_those_not_proven(strip: Path
     found = SearchOutcome([step], range(3), step, [], [])
     best = record_of(study, (), holes, Goal(0.5, 1.0), found, np.zeros((3, 2)))["best"]
     assert (best["failing"], best["unproven"]) == ([1], [0])
+
+
+def test_what_is_not_proven_is_not_said_to_be(strip: Path) -> None:
+    """Of a plan without a limit, after a stage that is not proven."""
+    step = Step(plans_of(strip, 1, 4), np.inf, Outcome((np.inf,), (0,), (0.1,)))
+    said, _ = sentence_on(SearchOutcome([step], range(1), step, [], []), Goal(None, 1.0, 4), np.zeros((1, 2)))
+    assert said == "4 fasteners leave inf mm in the one load case, not proven."
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])

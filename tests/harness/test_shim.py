@@ -20,12 +20,14 @@ from superelements import flat, scene_from, write_part
 
 from harness import solve
 from harness.placement.answer_journal import AnswerJournal
-from harness.placement.fresh_cases import Goal
+from harness.placement.fresh_cases import Goal, Sample, SearchOutcome
+from harness.placement.plan_search import Step
 from harness.placement.session import Outcome, PlanSession, Question
 from harness.planning.form_choice import Choice
 from harness.series.load_case_source import GapCases
 from harness.shimming.gap_regions import patches_of_gap
 from harness.shimming.joint_shims import each_joint
+from harness.shimming.outcome import sentence_of
 from harness.shimming.patches import patches_of, stock_of
 from harness.shimming.shim_search import ShimSearch
 from harness.shimming.study import ShimStudy
@@ -38,6 +40,7 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.model.fastener_forces import fastener_forces
 from problems.reporter import SILENT
 from problems.scene_files import read_scene
+from report.writers import shim_report
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
 RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
@@ -572,3 +575,81 @@ def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:
     (outcome,) = search.outcomes([((0, 0.02),)], [0], 50)
     inside, beyond = outcome.further[0][:2]
     assert inside < beyond == outcome.largest[0]
+
+
+def without_shims(gap_mm: float) -> Step:
+    """Of a case in four patches and beyond them."""
+    figures = (*[gap_mm] * 14, 0.0, 0.0)
+    return Step((), gap_mm, Outcome((gap_mm,), (0,), (gap_mm,), (figures,)))
+
+
+def test_no_shims_that_fresh_cases_refute_fail_by_these(study: ShimStudy) -> None:
+    """None was tried: that none of the stock is found would say too much, beside a gap within the limit."""
+    fresh = Sample(without_shims(0.2), range(1, 40, 2), "held-back rows", 15, (0.5, 0.9), "shim")
+    found = SearchOutcome([without_shims(0.05)], range(0, 40, 2), None, [fresh], [])
+    words, passed = sentence_of(found, Goal(0.1, 0.95), study)
+    assert not passed
+    assert words.startswith("FAIL: joints without a shim keep 0.1 mm in 75.0 % of 20 held-back rows")
+
+
+@pytest.mark.parametrize(("gap_mm", "said"), [(0.2, ", proven."), (inf, ", not proven.")])
+def test_only_what_is_proven_is_said_to_be(study: ShimStudy, gap_mm: float, said: str) -> None:
+    found = SearchOutcome([without_shims(gap_mm)], range(1), None, [], [])
+    words, _ = sentence_of(found, Goal(0.1, 1.0), study)
+    assert words.startswith("FAIL: no shims of the stock are found")
+    assert words.endswith(f"the largest gap in patch 1{said}")
+
+
+PATCH: dict[str, Any] = {
+    "patch": "kept",
+    "outline": [[0, 0], [200, 0], [200, 50], [0, 50]],
+    "area_mm2": 1e4,
+    **{"x_min": 0, "x_max": 200, "y_min": 0, "y_max": 50},
+}
+RECORD: dict[str, Any] = {
+    "title": "a joint",
+    "scene": "joint",
+    "said": "PASS: 1 of 1 joint",
+    "limit_mm": 0.1,
+    "allow_force": None,
+    "allow_stress": None,
+    "taper": False,
+    "stock": [0.1],
+    "sure": [],
+    "samples": [],
+    "forces": [],
+    "before": {"gap": None},
+    "after": {"gap": None},
+    "inputs": {},
+    "marks": [],
+    "bounds": [[0, 0], [200, 50]],
+    "worst_at": "(0, 0) mm",
+    **dict.fromkeys(("machine", "commit", "recorded_at"), ""),
+    "clean": True,
+}
+
+
+def report_of(record: dict[str, Any], out: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """report.md of a record, without its page and sheet."""
+    for name in ("write_page", "write_sheet"):
+        monkeypatch.setattr(shim_report, name, lambda *_: None)
+    (out / "shim.json").write_text(json.dumps(record))
+    return shim_report.write(out).read_text("utf-8")
+
+
+def test_a_patch_may_have_the_name_of_a_column_of_joints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each patch has a column there, too."""
+    figures = {"gap_before_mm": 0.15, "gap_after_mm": 0.05, "liquid_mm3": 1.0}
+    joint = {"joint": 0, "kept": True, "shims": 1, "plan": [[0, 0.1]]}
+    report_of(RECORD | {"joints": [joint], "patches": [PATCH | figures]}, tmp_path, monkeypatch)
+    table = pd.read_csv(tmp_path / "joints.csv")
+    assert list(table.columns) == ["joint", "kept", "shims", "kept, mm"]
+
+
+def test_liquid_shim_that_is_not_known_is_not_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A record has null for a figure of which nothing is proven."""
+    figures = dict.fromkeys(("gap_before_mm", "gap_after_mm", "liquid_mm3")) | {"thickness_mm": 0.1}
+    text = report_of(RECORD | {"patches": [PATCH | figures]}, tmp_path, monkeypatch)
+    assert "– mm³ fill what is left" in text
