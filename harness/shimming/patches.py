@@ -11,6 +11,7 @@ import numpy as np
 from harness.placement.candidates import ROWS_AND_COLUMNS, Place
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
+from problems.input.bounded_types import LARGEST
 from problems.input.tables import CSV_MIB, Cells, read_columns
 from problems.model.interface import AnyJoint, on_junction, places_of
 from problems.model.joint import Pair
@@ -22,7 +23,7 @@ RASTER = 32  # points along a side of the box of two outlines
 BORDERS, CORNERS = ("x_min", "x_max", "y_min", "y_max"), ("x", "y")
 SHAPE = "x_min < x_max and y_min < y_max, or 3 corners or more, each with the name of the outline"
 Shape = tuple[str, tuple[Place, ...], str]  # name, corners, and where it is in its file
-STOCK = "thicknesses above 0 mm in ascending order, as 0.2,0.3,0.5, or FIRST:LAST:STEP"
+STOCK = f"thicknesses above 0, at most {LARGEST:g} mm, ascending, as 0.2,0.3,0.5, or FIRST:LAST:STEP"
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,8 @@ def stock_of(text: str) -> tuple[float, ...]:
             values = np.round(np.arange(first, min(last, first + MOST * step) + step / 2, step), 9).tolist()
     except (ValueError, ZeroDivisionError):
         values = []
-    if not 0 < len(values) <= MOST or not np.isfinite(values).all() or np.diff([0.0, *values]).min() <= 0:
+    usable = 0 < len(values) <= MOST and all(value <= LARGEST for value in values)
+    if not usable or np.diff([0.0, *values]).min() <= 0:
         raise InputError.one("--stock", "thicknesses", text, STOCK)
     return tuple(values)
 
@@ -78,6 +80,7 @@ def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
         shapes = [(str(k), corners_of(*across, *up), "") for k, (up, across) in enumerate(cells, start=1)]
         return checked_patches(joint, shapes, joint.pairs)
     cut = not Cells.of(Path(source), CSV_MIB, BORDERS).header
+    cut = cut and any(Cells.of(Path(source), CSV_MIB, [name]).header for name in CORNERS)
     table, shapes = read_columns(Path(source), CORNERS if cut else BORDERS), []
     names = table.words["name"] or [str(k + 1) for k in range(len(table.rows))]
     rows = zip(names, table.rows, table.lines, strict=True)

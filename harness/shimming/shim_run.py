@@ -233,9 +233,10 @@ def shim(
 def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     """A fault for each number asked for that is no limit, and for what in a scene shims do not fit."""
     faults = [
-        Fault("shim", key, value, "above 0, and finite" if key != "share" else "above 0, at most 1")
+        Fault("shim", key, value, f"above 0, at most {most:g}")
         for key, value in asked.items()
-        if value is not None and not 0 < value <= (1 if key == "share" else MOST)
+        for most in [1 if key == "share" else MOST]
+        if value is not None and not 0 < value <= most
     ]
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):

@@ -324,7 +324,19 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
 def test_stocks_are_lists_or_steps() -> None:
     assert stock_of("0.2,0.3,0.5") == (0.2, 0.3, 0.5)
     assert stock_of("0.05:0.2:0.05") == (0.05, 0.1, 0.15, 0.2)
-    wrong = ["0", "-0.1,0.2", "0.3,0.2", "0.2,0.2", "nan", "0.1:0.5", "0.1:0.5:0", "0.5:0.1:0.1", "x"]
+    wrong = [
+        "0",
+        "-0.1,0.2",
+        "0.3,0.2",
+        "0.2,0.2",
+        "nan",
+        "0.1:0.5",
+        "0.1:0.5:0",
+        "0.5:0.1:0.1",
+        "x",
+        "inf",
+        "1e16",
+    ]
     for text in ("", *wrong):
         with pytest.raises(InputError, match="ascending"):
             stock_of(text)
@@ -395,7 +407,9 @@ def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
             ],
         ),
         (("--patches", "outlines.csv"), ["line 2, outline", "two of its edges cross", "a name of its own"]),
+        (("--patches", "borders.csv"), ["columns x_min, x_max, y_min, y_max, once each"]),
         (("--allow-gap", -1), ["limit_mm", "above 0"]),
+        (("--allow-force", 1e10), ["allow_force", "above 0, at most 1e+09"]),
         (("--patches", "patches.csv", "--missing", 9999), ["--missing: marks = '9999'"]),
         (("--share", 2), ["share", "at most 1"]),
         (("--cases", 10), ["--share", "take 59"]),
@@ -403,6 +417,7 @@ def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
 )
 def test_wrong_questions_are_refused(strip: Path, tmp_path: Path, words: Any, said: list[str]) -> None:
     (tmp_path / "patches.csv").write_text("x_min,x_max,y_min,y_max\n-5,100,0,50\n50,150,0,50\n9,9,0,1\n")
+    (tmp_path / "borders.csv").write_text("xmin,xmax,ymin,ymax\n0,100,0,50\n")
     corners = "a,0,0\na,90,50\na,90,0\na,0,50\n"  # a bow tie
     (tmp_path / "outlines.csv").write_text(f"name,x,y\n{corners}b,100,0\nb,150,0\nb,150,50\n{corners}")
     words = [tmp_path / word if str(word).endswith(".csv") else word for word in words]
