@@ -14,7 +14,7 @@ from harness.placement.fresh_cases import ALPHA, Cases, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
 from harness.placement.session import PlanSession
 from harness.results import records
-from harness.results.atomic_output import refuse_inputs
+from harness.results.atomic_output import refuse_inputs, refuse_unwritable
 from harness.results.provenance import fingerprints, stamp
 from harness.scene.scene_file import add_effect, edited, file_of, opened
 from harness.scene.solution import Source, load_scene
@@ -141,7 +141,9 @@ def shim(
     """
     read, directory = load_scene(scene), Path(out)
     inputs = [*read.sources, *(Path(file) for file in (patches, *cases.files) if file)]
+    refuse_unwritable(directory, inputs)
     refuse_inputs([directory / name for name in OUTPUTS], inputs)
+    records.refuse_other_command(directory, records.SHIMS, OUTPUTS)  # before patches are found
     asked: dict[str, Any] = {
         "limit_mm": allow_gap_mm,
         "allow_force": allow_force,

@@ -440,6 +440,17 @@ def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path
     assert not (tmp_path / "out").exists()
 
 
+def test_a_directory_of_another_command_is_refused_before_patches_are_found(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("harness.shimming.shim_run.PlanSession", lambda _: pytest.fail("solved"))
+    (tmp_path / "plans.jsonl").touch()
+    asked = ("--allow-gap", 0.1, "--stock", "0.1", "--cases", 2, "--share", 1)
+    done = harness("shim", strip, *asked, "--out", tmp_path)
+    assert done.exit_code == 2
+    assert "has plans.jsonl of another command" in " ".join(done.output.split())
+
+
 @pytest.mark.usefixtures("without_report")
 @pytest.mark.parametrize(("command", "row"), [("shim", 2), ("place", 0)])
 def test_no_answer_of_a_table_that_has_changed_is_used(
