@@ -101,8 +101,9 @@ def corners_of(west: float, east: float, south: float, north: float) -> tuple[Pl
 def checked_patches(
     joint: AnyJoint, shapes: Sequence[Shape], pairs: Iterable[Pair], source: str = "--patches"
 ) -> tuple[Patch, ...]:
-    """A patch for each shape in each pair; none for a cell, which is in no file, without a contact. Raises
-    InputError if an outline is none, off the junction, without a contact, or overlaps another.
+    """A patch for each shape in each pair where it has a contact; a cell, which is in no file, needs none.
+
+    Raises InputError if an outline is none, off the junction, without a contact, or overlaps another.
     """
     low, high = joint.bounds[0] - NEAR, joint.bounds[1] + NEAR
     faults = [Fault(source, at, outline, SHAPE) for _, outline, at in shapes if len(outline) < 3]
@@ -111,10 +112,11 @@ def checked_patches(
             faults.append(Fault(source, at, name, "a name of its own, its corners one after another"))
         off = [place for place in outline if (place < low).any() or (place > high).any()]
         faults += [Fault(source, at, place, on_junction(joint)) for place in off[:1]]
-    patches, sound = [], [shape for shape in shapes if len(shape[1]) >= 3]
+    patches, sound, pairs = [], [shape for shape in shapes if len(shape[1]) >= 3], tuple(pairs)
     sheets = [Shims(kind="shims", thickness=1.0, outline=outline) for _, outline, _ in sound]
     for pair, ((name, outline, at), sheet) in product(pairs, zip(sound, sheets, strict=True)):
-        if not at and not sheet.covers(joint.places(pair), joint).any():
+        here, somewhere = (sheet.covers(places_of(joint, some), joint).any() for some in ([pair], pairs))
+        if not here and (somewhere or not at):
             continue
         between, where = (None, "") if len(joint.pairs) == 1 else (pair, f" {'–'.join(pair)}")
         shim = sheet.model_copy(update={"between": between})

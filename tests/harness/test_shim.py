@@ -155,6 +155,21 @@ def test_a_cell_without_a_contact_is_no_patch(tmp_path: Path) -> None:
         patches_of(joint, str(csv))
 
 
+def test_a_patch_is_one_where_its_pair_has_contacts(tmp_path: Path) -> None:
+    """Of two parts that meet a third one at either end, each has the patch of its end."""
+    x, parts = JOINT.nodes[:, 0], []
+    for name, inside in (("a", x >= 0.0), ("b", x <= 200.0), ("c", x >= 200.0)):
+        parts.append(write_part(tmp_path, name, 40 * np.eye(inside.sum()), flat(JOINT.nodes[inside])))
+    joint = scene_from(parts, contacts=[["a", "b"], ["a", "c"]]).joint
+    csv = tmp_path / "patches.csv"
+    csv.write_text("name,x_min,x_max,y_min,y_max\nleft,0,160,0,120\nright,240,400,0,120\n")
+    patches = patches_of(joint, str(csv))
+    assert [(patch.name, patch.shim.between) for patch in patches] == [
+        ("left a–b", ("a", "b")),
+        ("right a–c", ("a", "c")),
+    ]
+
+
 def test_outlines_are_cut_to_any_shape(strip: Path, tmp_path: Path) -> None:
     """An L and the rest of a rectangle, whichever way round: the gap of two rectangles, each contact once."""
     joint, csv = scene_at(strip).joint, tmp_path / "outlines.csv"
