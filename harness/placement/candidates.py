@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.effects.fasteners import Fasteners
 from problems.errors import Fault, InputError
-from problems.forms.assembly import Matrix
+from problems.forms.assembly import Mask, Matrix
 from problems.input.scan_points import crowded
 from problems.input.tables import AS_NAMED, TableOptions, read_columns
 from problems.model.effect import SpringEffect
@@ -64,9 +64,10 @@ class MovableFasteners:
     def candidates(self, holes: str | None, options: TableOptions = AS_NAMED) -> tuple[Plan, Names]:
         """The holes that fasteners may go into, and their names if the CSV has a column `name`.
 
-        holes : a pattern `4x32`, rows × columns of equal cells of the junction, or the path of a CSV with
-        columns x and y, mm, with the headings of `options`; None: where the scene's fasteners are. Raises
-        InputError if a hole is off the parts, or there twice.
+        holes : a pattern `4x32`, rows × columns of equal cells of the junction, of which those count whose
+        middle is on the parts, or the path of a CSV with columns x and y, mm, with the headings of `options`;
+        None: where the scene's fasteners are. Raises InputError if a hole of a CSV is off the parts, if there
+        is none, or if one is there twice.
         """
         if holes is None:
             return self.current, {}
@@ -75,7 +76,11 @@ class MovableFasteners:
             if not 0 < rows * columns <= MOST:
                 allowed = f"rows x columns, 1 to {MOST} holes, or a CSV file"
                 raise InputError.one("--candidates", "holes", holes, allowed)
-            points, faults, labels = grid(self.bare, rows, columns), [], []
+            points = grid(self.bare, rows, columns).round(DIGITS)
+            points, faults, labels = points[self._on_parts(points)], [], []
+            if not len(points):
+                allowed = "cells of which a middle is on the parts"
+                raise InputError.one("--candidates", "holes", holes, allowed)
         else:
             table = read_columns(Path(holes), ("x", "y"), replace(options, missing=()))
             points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.words["name"]
@@ -88,12 +93,16 @@ class MovableFasteners:
     def faults(self, points: Matrix, source: str) -> list[Fault]:
         """One fault for each point off the parts, there twice, or where a fastener stays installed."""
         joint = self.bare.joint
-        on = joint.covers(self.fastener.parts(joint), points)
-        faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in np.flatnonzero(~on)]
+        off = np.flatnonzero(~self._on_parts(points))
+        faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in off]
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
         for installed in self.bare.effects_of(SpringEffect) if len(points) and not self.scene.stages else ():
             faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
         return faults + _twice(points, source)
+
+    def _on_parts(self, points: Matrix) -> Mask:
+        joint = self.bare.joint
+        return joint.covers(self.fastener.parts(joint), points)
 
 
 def movable_fasteners(scene: Scene) -> list[Fasteners]:

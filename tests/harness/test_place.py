@@ -19,6 +19,7 @@ from clopper_pearson import interval_of
 from commands import harness
 from scipy.stats import binom, binomtest
 from small_joints import FASTENERS, GAP, INLINE, two_parts
+from superelements import scene_from, with_bay
 
 from harness import GapCases, shim, solve
 from harness import place as place_fasteners
@@ -682,6 +683,15 @@ def test_a_mark_of_missing_gaps_leaves_out_no_hole(strip: Path, tmp_path: Path) 
     marked, movable = TableOptions(missing=(0,)), MovableFasteners.of(read_scene(str(strip)))
     assert movable.candidates(str(tmp_path / "holes.csv"), marked)[0] == ((10.0, 0.0), (20.0, 10.0))
     assert [fault.where for fault in GapCases(options=marked).faults(table=True)] == ["--missing"]
+
+
+def test_cells_of_a_pattern_in_a_bay_have_no_hole(tmp_path: Path) -> None:
+    """Of a table a hole there is refused; so is a pattern without any on the parts."""
+    fasteners = {"kind": "fasteners", "preload": 1.0, "points": [[10.0, 10.0]]}
+    movable = MovableFasteners.of(scene_from(with_bay(tmp_path), fasteners))
+    assert movable.candidates("1x4")[0] == ((12.5, 50.0), (87.5, 50.0))
+    with pytest.raises(InputError, match="a middle is on the parts"):
+        movable.candidates("1x1")
 
 
 def test_holes_are_checked_where_plans_have_them(strip: Path, tmp_path: Path) -> None:
