@@ -51,7 +51,7 @@ def stock_of(text: str) -> tuple[float, ...]:
         if ":" in text:
             first, last, step = values
             values = np.round(np.arange(first, min(last, first + MOST * step) + step / 2, step), 9).tolist()
-    except (ValueError, ZeroDivisionError):
+    except (ValueError, ZeroDivisionError, AttributeError, TypeError):  # the last two: no text
         values = []
     usable = 0 < len(values) <= MOST and all(value <= LARGEST for value in values)
     if not usable or np.diff([0.0, *values]).min() <= 0:

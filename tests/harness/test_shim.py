@@ -352,7 +352,8 @@ def test_stocks_are_lists_or_steps() -> None:
         "inf",
         "1e16",
     ]
-    for text in ("", *wrong):
+    none: Any = ["", [0.1, 0.2], 0.1, *wrong]
+    for text in none:
         with pytest.raises(InputError, match="ascending"):
             stock_of(text)
 
