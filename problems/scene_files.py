@@ -40,6 +40,7 @@ ASSEMBLIES = FOLDER / "assemblies"
 KEYS = ("title", "assembly", "joint", "effect", "stage", "output", "random", "matrices")
 TOML_MIB = 10
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
+EFFECT = re.compile(r"effect\[(\d+)\]")
 
 
 def scene_names() -> list[str]:
@@ -158,11 +159,22 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
             faults += table.unknown_stages([stage.name for stage in stages]) if stages else ()
         if len(effects) == len(tables):
             plan = StagePlan(effects, stages, joint)
-            faults += [Fault(str(path), *fault) for fault in plan.faults()]
+            faults += [_of_stages(tables, path, *fault) for fault in plan.faults()]
             faults += [Fault(str(joint_path), *fault) for fault in plan.floating()]
     if faults or joint is None:
         raise InputError(faults)
     return JointScene(name, title, joint, effects, stages, output, random)
+
+
+def _of_stages(tables: list[EffectTable], path: Path, key: str, value: object, allowed: str) -> Fault:
+    """A fault of the stages, which count all effects, with the numbers that these have in their own files."""
+
+    def own(found: re.Match[str]) -> str:
+        return f"effect[{tables[int(found[1])].index}]"
+
+    named = EFFECT.match(key)
+    where = tables[int(named[1])].where if named else path
+    return Fault(str(where), EFFECT.sub(own, key), value, EFFECT.sub(own, allowed))
 
 
 def _random(path: Path, name: str, value: object, faults: list[Fault]) -> Iterator[str]:

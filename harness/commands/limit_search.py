@@ -133,7 +133,7 @@ def tolerance(
     read, directory = load_scene(scene), Path(out)
     share, resolution = SHARE if share is None else share, RESOLUTION if resolution is None else resolution
     keys = keys_of(read, stiffness=True) if isinstance(read, JointScene) else {}
-    name, _, ends = find.partition("=")
+    name, ends = (part.strip() for part in find.partition("=")[::2])
     try:
         low, high = map(float, ends.split(":"))
     except ValueError:
@@ -148,7 +148,11 @@ def tolerance(
     inputs = [*read.sources, *(Path(file) for file in (*cases.files, options.plugin) if file)]
     refuse_inputs([directory / name for name in (TOLERANCE, *OUTPUTS)], inputs)
     key, grid = keys[name], np.linspace(low, high, ceil(1 / resolution - 1e-9) + 1)
-    values = [float(f"{value:.10g}") for value in grid]
+    values = [*dict.fromkeys(float(f"{value:.10g}") for value in grid)]
+    assert isinstance(read, JointScene)  # which alone has keys
+    tried = (key.faults(read, value, f"--find {name}") for value in (*values[:2], values[-1]))
+    if wrong := next(filter(None, tried), []):
+        raise InputError(wrong)
 
     def gaps(value: float, seed: int | None = None) -> tuple[Vector, Vector]:
         """Bounds on the largest gap in each case at a value, below and above, (N,) mm; NaN without an answer.

@@ -78,6 +78,11 @@ class Settings:
 
     def applied(self, scene: JointScene) -> tuple[Effect, ...]:
         """The scene's effects with these values. Raises InputError, as `validate` does."""
+        own = Settings.of(scene)
+        both = ("means", self.means, own.means), ("pressures", self.pressures, own.pressures)
+        for name, given, there in both:
+            if len(given) != len(there):
+                raise InputError.one(PAGE, name, given, f"as many as in the scene, {len(there)}")
         means, pressures, faults, made = iter(self.means), iter(self.pressures), list[Fault](), list[Effect]()
         fasteners = False
         for effect in scene.effects:

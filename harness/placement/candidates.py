@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.effects.fasteners import Fasteners
 from problems.errors import Fault, InputError
-from problems.forms.assembly import Matrix
+from problems.forms.assembly import Mask, Matrix
 from problems.input.scan_points import crowded
 from problems.input.tables import AS_NAMED, TableOptions, read_columns
 from problems.model.effect import SpringEffect
@@ -17,6 +17,7 @@ from problems.model.interface import on_junction
 from problems.model.positions import MOST
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import stage_scenes
+from problems.model.stages import SLICE
 
 Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
@@ -43,7 +44,7 @@ class MovableFasteners:
     @classmethod
     def of(cls, scene: Scene) -> "MovableFasteners":
         """Raises InputError as `movable_fasteners` does, if two are at one place, or if a stage has only some
-        of them.
+        of them, or names them by their numbers.
         """
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
@@ -51,6 +52,10 @@ class MovableFasteners:
             if (acting := list(last.effects_of(Fasteners))) and acting != fasteners:
                 allowed = f"all points at once; in stage {name} some act: they change places"
                 raise InputError.one(f"scene {scene.name}", "fasteners", [fasteners[0].name], allowed)
+        named = [one for stage in scene.stages for one in (*stage.on, *stage.off)]
+        if parts := [one for one in named if (some := SLICE.fullmatch(one)) and some[1] == fasteners[0].name]:
+            allowed = "its name alone: a plan may have another number of points"
+            raise InputError.one(f"scene {scene.name}", "fasteners in stages", parts, allowed)
         marks = np.concatenate([each.marks(scene.joint) for each in fasteners])
         if twice := _twice(marks, f"scene {scene.name}"):
             raise InputError(twice)
@@ -59,9 +64,10 @@ class MovableFasteners:
     def candidates(self, holes: str | None, options: TableOptions = AS_NAMED) -> tuple[Plan, Names]:
         """The holes that fasteners may go into, and their names if the CSV has a column `name`.
 
-        holes : a pattern `4x32`, rows × columns of equal cells of the junction, or the path of a CSV with
-        columns x and y, mm, under the headings of `options`; None: where the scene's fasteners are. Raises
-        InputError if a hole is off the parts, or there twice.
+        holes : a pattern `4x32`, rows × columns of equal cells of the junction, of which those count whose
+        middle is on the parts, or the path of a CSV with columns x and y, mm, with the headings of `options`;
+        None: where the scene's fasteners are. Raises InputError if a hole of a CSV is off the parts, if there
+        is none, or if one is there twice.
         """
         if holes is None:
             return self.current, {}
@@ -70,10 +76,13 @@ class MovableFasteners:
             if not 0 < rows * columns <= MOST:
                 allowed = f"rows x columns, 1 to {MOST} holes, or a CSV file"
                 raise InputError.one("--candidates", "holes", holes, allowed)
-            points, faults, labels = grid(self.bare, rows, columns), [], []
+            points = grid(self.bare, rows, columns).round(DIGITS)
+            points, faults, labels = points[self._on_parts(points)], [], []
+            if not len(points):
+                allowed = "cells of which a middle is on the parts"
+                raise InputError.one("--candidates", "holes", holes, allowed)
         else:
-            headings = replace(options, missing=())  # marks are of gaps
-            table = read_columns(Path(holes), ("x", "y"), headings)
+            table = read_columns(Path(holes), ("x", "y"), replace(options, missing=()))
             points, faults, labels = np.array(table.rows).reshape(-1, 2), table.faults, table.words["name"]
         points = points.round(DIGITS)  # as plans have them: rounding may leave the parts
         faults = faults + self.faults(points, holes)
@@ -84,12 +93,16 @@ class MovableFasteners:
     def faults(self, points: Matrix, source: str) -> list[Fault]:
         """One fault for each point off the parts, there twice, or where a fastener stays installed."""
         joint = self.bare.joint
-        on = joint.covers(self.fastener.parts(joint), points)
-        faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in np.flatnonzero(~on)]
+        off = np.flatnonzero(~self._on_parts(points))
+        faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in off]
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
-        for installed in () if self.scene.stages else self.bare.effects_of(SpringEffect):
+        for installed in self.bare.effects_of(SpringEffect) if len(points) and not self.scene.stages else ():
             faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
         return faults + _twice(points, source)
+
+    def _on_parts(self, points: Matrix) -> Mask:
+        joint = self.bare.joint
+        return joint.covers(self.fastener.parts(joint), points)
 
 
 def movable_fasteners(scene: Scene) -> list[Fasteners]:

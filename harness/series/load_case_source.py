@@ -91,7 +91,7 @@ class GapCases:
 
     def faults(self, sweep: Sequence[str] = (), table: bool = False) -> list[Fault]:
         """A fault for each number out of range, if the cases come from more than one source, or if options of
-        tables have none. table : whether another table has the headings.
+        tables have none. table : whether another one has `columns`.
         """
         names = (*("seed",)[bool(self.scans) :], "mean", "sd", "correlation_length", "around")
         random = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]

@@ -25,18 +25,22 @@ UNITS = ("N", "N/mm²")  # of the limits of force and stress
 
 def sentence_of(result: SearchOutcome, goal: Goal, study: ShimStudy) -> tuple[str, bool]:
     """The outcome in words, and whether the plan passed."""
-    step, sample = result.best, result.samples[-1] if result.samples else None
+    first, sample = result.steps[0], result.samples[-1] if result.samples else None
+    limit = goal.limit_mm or 0.0
+    # No shims may be enough where it chose, and refuted by fresh cases.
+    step = result.best or (first if first.gap_mm <= limit else None)
     least = step or min(result.steps, key=lambda step: step.gap_mm)
     figures = least.outcome.further[least.worst]
     gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
     most = "".join(f", {beside(limit)(value)} {unit}" for value, limit, unit in more if limit < inf)
-    largest = beside(goal.limit_mm or 0.0)(gaps.max())
+    largest = beside(limit)(gaps.max())
     leave = f"{largest} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
     if step is None:
         words = "no shims of the stock are found with which all limits are kept; the best tried leave"
         at = [*(f"in patch {patch.name}" for patch in study.patches), "beyond all patches"]
-        return f"FAIL: {words} {leave}, the largest gap {at[int(gaps.argmax())]}, proven.", False
-    passed, count = (sample.step if sample else step).gap_mm <= (goal.limit_mm or 0.0), len(step.plan)
+        proven = "proven" if np.isfinite(figures).all() else "not proven"
+        return f"FAIL: {words} {leave}, the largest gap {at[int(gaps.argmax())]}, {proven}.", False
+    passed, count = (sample.step if sample else step).gap_mm <= limit, len(step.plan)
     words = f"{counted(count, 'shim') if count else 'the scene'} {'leave' if count > 1 else 'leaves'} {leave}"
     words = sample.sentence(goal) if sample else words
     none_needed = "" if count or not passed else "no shim is needed: "

@@ -11,6 +11,7 @@ import numpy as np
 from harness.placement.candidates import ROWS_AND_COLUMNS, Place
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
+from problems.input.bounded_types import LARGEST
 from problems.input.tables import CSV_MIB, Cells, read_columns
 from problems.model.interface import AnyJoint, on_junction, places_of
 from problems.model.joint import Pair
@@ -22,7 +23,7 @@ RASTER = 32  # points along a side of the box of two outlines
 BORDERS, CORNERS = ("x_min", "x_max", "y_min", "y_max"), ("x", "y")
 SHAPE = "x_min < x_max and y_min < y_max, or 3 corners or more, each with the name of the outline"
 Shape = tuple[str, tuple[Place, ...], str]  # name, corners, and where it is in its file
-STOCK = "thicknesses above 0 mm in ascending order, as 0.2,0.3,0.5, or FIRST:LAST:STEP"
+STOCK = f"thicknesses above 0, at most {LARGEST:g} mm, ascending, as 0.2,0.3,0.5, or FIRST:LAST:STEP"
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,10 @@ def stock_of(text: str) -> tuple[float, ...]:
         if ":" in text:
             first, last, step = values
             values = np.round(np.arange(first, min(last, first + MOST * step) + step / 2, step), 9).tolist()
-    except (ValueError, ZeroDivisionError):
+    except (ValueError, ZeroDivisionError, AttributeError, TypeError):  # the last two: no text
         values = []
-    if not 0 < len(values) <= MOST or not np.isfinite(values).all() or np.diff([0.0, *values]).min() <= 0:
+    usable = 0 < len(values) <= MOST and all(value <= LARGEST for value in values)
+    if not usable or np.diff([0.0, *values]).min() <= 0:
         raise InputError.one("--stock", "thicknesses", text, STOCK)
     return tuple(values)
 
@@ -78,6 +80,7 @@ def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
         shapes = [(str(k), corners_of(*across, *up), "") for k, (up, across) in enumerate(cells, start=1)]
         return checked_patches(joint, shapes, joint.pairs)
     cut = not Cells.of(Path(source), CSV_MIB, BORDERS).header
+    cut = cut and any(Cells.of(Path(source), CSV_MIB, [name]).header for name in CORNERS)
     table, shapes = read_columns(Path(source), CORNERS if cut else BORDERS), []
     names = table.words["name"] or [str(k + 1) for k in range(len(table.rows))]
     rows = zip(names, table.rows, table.lines, strict=True)
@@ -98,8 +101,9 @@ def corners_of(west: float, east: float, south: float, north: float) -> tuple[Pl
 def checked_patches(
     joint: AnyJoint, shapes: Sequence[Shape], pairs: Iterable[Pair], source: str = "--patches"
 ) -> tuple[Patch, ...]:
-    """A patch for each shape in each pair; none for a cell, which is in no file, without a contact. Raises
-    InputError if an outline is none, off the junction, without a contact, or overlaps another.
+    """A patch for each shape in each pair where it has a contact; a cell, which is in no file, needs none.
+
+    Raises InputError if an outline is none, off the junction, without a contact, or overlaps another.
     """
     low, high = joint.bounds[0] - NEAR, joint.bounds[1] + NEAR
     faults = [Fault(source, at, outline, SHAPE) for _, outline, at in shapes if len(outline) < 3]
@@ -108,10 +112,11 @@ def checked_patches(
             faults.append(Fault(source, at, name, "a name of its own, its corners one after another"))
         off = [place for place in outline if (place < low).any() or (place > high).any()]
         faults += [Fault(source, at, place, on_junction(joint)) for place in off[:1]]
-    patches, sound = [], [shape for shape in shapes if len(shape[1]) >= 3]
+    patches, sound, pairs = [], [shape for shape in shapes if len(shape[1]) >= 3], tuple(pairs)
     sheets = [Shims(kind="shims", thickness=1.0, outline=outline) for _, outline, _ in sound]
     for pair, ((name, outline, at), sheet) in product(pairs, zip(sound, sheets, strict=True)):
-        if not at and not sheet.covers(joint.places(pair), joint).any():
+        here, somewhere = (sheet.covers(places_of(joint, some), joint).any() for some in ([pair], pairs))
+        if not here and (somewhere or not at):
             continue
         between, where = (None, "") if len(joint.pairs) == 1 else (pair, f" {'–'.join(pair)}")
         shim = sheet.model_copy(update={"between": between})

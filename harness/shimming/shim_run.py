@@ -16,7 +16,7 @@ from harness.placement.fresh_cases import ALPHA, Cases, Goal, search_in_rounds
 from harness.placement.run import HELD_BACK, other_gaps
 from harness.placement.session import PlanSession
 from harness.results import records
-from harness.results.atomic_output import refuse_inputs
+from harness.results.atomic_output import refuse_inputs, refuse_unwritable
 from harness.results.provenance import fingerprints, stamp
 from harness.scene.scene_file import add_effect, edited, file_of, opened
 from harness.scene.solution import Source, load_scene
@@ -143,7 +143,9 @@ def shim(
     """
     read, directory = load_scene(scene), Path(out)
     inputs = [*read.sources, *(Path(file) for file in (patches, *cases.files) if file)]
+    refuse_unwritable(directory, inputs)
     refuse_inputs([directory / name for name in OUTPUTS], inputs)
+    records.refuse_other_command(directory, records.SHIMS, OUTPUTS)  # before patches are found
     asked: dict[str, Any] = {
         "limit_mm": allow_gap_mm,
         "allow_force": allow_force,
@@ -238,9 +240,10 @@ def shim(
 def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     """A fault for each number asked for that is no limit, and for what in a scene shims do not fit."""
     faults = [
-        Fault("shim", key, value, "above 0, and finite" if key != "share" else "above 0, at most 1")
+        Fault("shim", key, value, f"above 0, at most {most:g}")
         for key, value in asked.items()
-        if value is not None and not 0 < value <= (1 if key == "share" else MOST)
+        for most in [1 if key == "share" else MOST]
+        if value is not None and not 0 < value <= most
     ]
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):

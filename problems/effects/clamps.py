@@ -8,7 +8,7 @@ import numpy as np
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded_types import Positive
 from problems.model.interface import AnyJoint
-from problems.model.joint import Pair
+from problems.model.joint import Faults, Pair
 from problems.model.junction_terms import pressing_forces, sides
 from problems.model.positions import Positions
 
@@ -28,6 +28,11 @@ class Clamps(Positions):
     in_holes: ClassVar[bool] = False
     clamping_force: Annotated[Positive, "N"]
     radius: Annotated[Positive, "mm"] = 20.0
+
+    def unusual(self, joint: AnyJoint) -> Faults:
+        yield from super().unusual(joint)
+        if self.radius > (longest := float(np.ptp(joint.bounds, axis=0).max())):
+            yield "radius", self.radius, f"at most {longest:g} mm, the longer side of the junction"
 
     def force(self, joint: AnyJoint) -> Vector:
         centres = self.marks(joint)

@@ -169,8 +169,10 @@ def _read(path: Path, suffix: str, m: int, options: TableOptions, labels: Sequen
                 gaps: Matrix = np.load(path, mmap_mode="r")
             case ".npz":
                 with np.load(path) as archive:
-                    (name,) = ["gaps"] if "gaps" in archive.files else archive.files
-                    gaps = archive[name]
+                    names = ["gaps"] if "gaps" in archive.files else archive.files
+                    if len(names) != 1:
+                        raise InputError.one(path, "arrays", names, "gaps, or one array alone")
+                    gaps = archive[names[0]]
             case _:
                 raise InputError.one(path, "file", suffix, "a .csv, .npz or .npy")
         if gaps.dtype.kind not in "fiu":

@@ -309,5 +309,6 @@ def random_inputs(
         faults.append(Fault("--contributors", "N, inputs", (N, d), allowed))
     if faults:
         raise InputError(faults)
-    count, notes = (N * (d + 2) if N else count), (gaps.notes if gaps else ())
+    medians = [f"{one.name}: {one.text}, median {one.law.median():.4g}" for one in inputs]
+    count, notes = (N * (d + 2) if N else count), (*medians, *(gaps.notes if gaps else ()))
     return RandomInputs(scene, tuple(inputs), gaps, seed, count, form, bool(N), notes)

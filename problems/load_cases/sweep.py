@@ -183,7 +183,7 @@ def effect_name(scene: JointScene, index: int) -> str:
 
 
 def _step(scene: JointScene, text: str, faults: list[Fault]) -> tuple[Key, tuple[float, ...]] | None:
-    name, equals, values = text.partition("=")
+    name, equals, values = (part.strip() for part in text.partition("="))
     numbers = _values(values)
     if not equals or not 0 < len(numbers) <= MOST:
         allowed = f"at most {MOST} values" if len(numbers) > MOST else SYNTAX

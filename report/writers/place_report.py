@@ -32,7 +32,7 @@ FAMILIES = {
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report/report.md from the record and the series in DIRECTORY. Returns its path."""
     record = quoted(json.loads((directory / "place.json").read_text("utf-8")))
-    steps = pd.DataFrame(record["steps"])
+    steps = pd.DataFrame(record["steps"]).astype({"gap_mm": float})  # NaN where nothing is proven
     title = f"Where fasteners go: {record['title']}"
     with style.applied():
         sections = [Section("The plan", [_summary(record), _families(record, steps)])]

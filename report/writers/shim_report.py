@@ -36,7 +36,8 @@ def write(directory: Path) -> Path:
     Returns the path of report.md.
     """
     record = quoted(json.loads((directory / "shim.json").read_text("utf-8")))
-    patches, title = pd.DataFrame(record["patches"]), f"Shims: {record['title']}"
+    patches = pd.DataFrame(record["patches"]).astype(dict.fromkeys(COLUMNS.values(), float))  # NaN: not known
+    title = f"Shims: {record['title']}"
     label, what, heads = "thickness_mm", "thickness in mm", [number("thickness, mm", "thickness_mm")]
     if "thickness_end_mm" in patches:
         heads.append(number("at its other end, mm", "thickness_end_mm"))
@@ -56,7 +57,7 @@ def write(directory: Path) -> Path:
                 (patches["patch"][at[1]], ", other end" * (at[0] != sizes[0])) for at in thicknesses.columns
             ]
             thicknesses.columns = pd.Index(["".join(end) for end in ends])
-            files["joints"] = pd.DataFrame(joints).join(thicknesses, on="joint")
+            files["joints"] = pd.DataFrame(joints).join(thicknesses, on="joint", rsuffix=", mm")
             blocks += _stock(table.join(patches["area_mm2"], on="patch"), sizes)
         shims = patches[patches["thickness_mm"] > 0]
         ranges = [Column(f"{axis}, mm", partial(_range, axis)) for axis in "xy"]
@@ -91,6 +92,7 @@ def write(directory: Path) -> Path:
 
 def _facts(record: dict[str, Any], patches: pd.DataFrame, shims: int) -> dict[str, str]:
     at_limit = patches[patches["gap_after_mm"] > NEAR * record["limit_mm"]]["patch"]
+    liquid = patches["liquid_mm3"].sum(skipna=False)
     per_joint = Counter(joint["shims"] for joint in record.get("joints", ()) if joint["kept"])
     return {
         "found": record["said"],
@@ -98,7 +100,7 @@ def _facts(record: dict[str, Any], patches: pd.DataFrame, shims: int) -> dict[st
         "fresh cases": "; ".join(f"{s['kept']} of {s['cases']} keep all limits" for s in record["samples"]),
         "shims per joint": ", ".join(f"{n} in {counted(per_joint[n], 'joint')}" for n in sorted(per_joint)),
         "at the limit": ", ".join(at_limit),
-        "liquid shim": f"{significant(patches['liquid_mm3'].sum())} mm³ fill what is left in all patches",
+        "liquid shim": f"{significant(liquid)} mm³ fill what is left in all patches",
         "how sure": ". ".join(record["sure"]),
         **{f"largest {key}": _largest(record, key, shims) for key in LIMITS},
     }

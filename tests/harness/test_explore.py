@@ -195,6 +195,7 @@ def test_what_is_in_the_file_of_the_assembly_cannot_be_saved_changed(tmp_path: P
     [
         ({"places": ((500.0, 10.0),)}, ["fasteners.points[0]", "[500.0, 10.0]", "on the junction"]),
         ({"preload": 0.0}, ["fasteners.preload", "0.0", "greater than 0"]),
+        ({"means": ()}, ["page: means = (): as many as in the scene, 1"]),
         (
             {"means": (float("nan"),), "preload": -1.0},
             ["initial_gap.mean", "nan", "fasteners.preload", "-1.0"],

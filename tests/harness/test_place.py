@@ -19,6 +19,7 @@ from clopper_pearson import interval_of
 from commands import harness, wrong_usage
 from scipy.stats import binom, binomtest
 from small_joints import FASTENERS, GAP, INLINE, two_parts
+from superelements import scene_from, with_bay
 
 from harness import GapCases, shim, solve
 from harness import place as place_fasteners
@@ -290,6 +291,11 @@ def test_a_case_of_which_nothing_is_proven_is_named() -> None:
     said, passed = sentence_on(found, Goal(0.5, 1.0), np.zeros((1, 2)))
     assert said.endswith("of 2 fresh cases (95 % interval 10.0 to 90.0 %); nothing is proven of case 8.")
     assert not passed
+def test_what_is_not_proven_is_not_said_to_be(strip: Path) -> None:
+    """Of a plan without a limit, after a stage that is not proven."""
+    step = Step(plans_of(strip, 1, 4), np.inf, Outcome((np.inf,), (0,), (0.1,)))
+    said, _ = sentence_on(SearchOutcome([step], range(1), step, [], []), Goal(None, 1.0, 4), np.zeros((1, 2)))
+    assert said == "4 fasteners leave inf mm in the one load case, not proven."
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])
@@ -667,13 +673,40 @@ def test_scenes_whose_fasteners_cannot_move(tmp_path: Path, fasteners: str, said
         MovableFasteners.of(read_scene(str(path)))
 
 
-def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("holes", "said"),
+    [
+        ("x,y\n10,10\n30,10\n", r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"),
+        ("x,y\n", r"holes\.csv: rows = 0: at least one row"),
+        (None, r"holes\.csv: file = 'No such file"),
+    ],
+)
+def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path, holes: str | None, said: str) -> None:
+    """Of a table without a hole that is said alone."""
     installed = '[[effect]]\nkind = "installed_fasteners"\npoints = [[30.0, 10.0]]\n'
     scene = tmp_path / "scene.toml"
     scene.write_text(two_parts() + GAP.replace("60.0", "50.0") + FASTENERS + installed)
-    (tmp_path / "holes.csv").write_text("x,y\n10,10\n30,10\n")
-    with pytest.raises(InputError, match=r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"):
+    if holes is not None:
+        (tmp_path / "holes.csv").write_text(holes)
+    with pytest.raises(InputError, match=said):
         MovableFasteners.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
+
+
+def test_a_mark_of_missing_gaps_leaves_out_no_hole(strip: Path, tmp_path: Path) -> None:
+    """It marks a gap, and a table of holes has none."""
+    (tmp_path / "holes.csv").write_text("x,y\n10,0\n20,10\n")
+    marked, movable = TableOptions(missing=(0,)), MovableFasteners.of(read_scene(str(strip)))
+    assert movable.candidates(str(tmp_path / "holes.csv"), marked)[0] == ((10.0, 0.0), (20.0, 10.0))
+    assert [fault.where for fault in GapCases(options=marked).faults(table=True)] == ["--missing"]
+
+
+def test_cells_of_a_pattern_in_a_bay_have_no_hole(tmp_path: Path) -> None:
+    """Of a table a hole there is refused; so is a pattern without any on the parts."""
+    fasteners = {"kind": "fasteners", "preload": 1.0, "points": [[10.0, 10.0]]}
+    movable = MovableFasteners.of(scene_from(with_bay(tmp_path), fasteners))
+    assert movable.candidates("1x4")[0] == ((12.5, 50.0), (87.5, 50.0))
+    with pytest.raises(InputError, match="a middle is on the parts"):
+        movable.candidates("1x1")
 
 
 def test_holes_are_checked_where_plans_have_them(strip: Path, tmp_path: Path) -> None:

@@ -20,12 +20,14 @@ from superelements import flat, scene_from, write_part
 
 from harness import solve
 from harness.placement.answer_journal import AnswerJournal
-from harness.placement.fresh_cases import Goal
+from harness.placement.fresh_cases import Goal, Sample, SearchOutcome
+from harness.placement.plan_search import Step
 from harness.placement.session import Outcome, PlanSession, Question
 from harness.planning.form_choice import Choice
 from harness.series.load_case_source import GapCases
 from harness.shimming.gap_regions import patches_of_gap
 from harness.shimming.joint_shims import each_joint
+from harness.shimming.outcome import sentence_of
 from harness.shimming.patches import patches_of, stock_of
 from harness.shimming.shim_search import ShimSearch
 from harness.shimming.study import ShimStudy
@@ -38,6 +40,7 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.model.fastener_forces import fastener_forces
 from problems.reporter import SILENT
 from problems.scene_files import read_scene
+from report.writers import shim_report
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
 RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
@@ -150,6 +153,21 @@ def test_a_cell_without_a_contact_is_no_patch(tmp_path: Path) -> None:
     csv.write_text("x_min,x_max,y_min,y_max\n0,90,0,60\n205,235,0,60\n")
     with pytest.raises(InputError, match=r"line 3, x, y = .* ranges with a node"):
         patches_of(joint, str(csv))
+
+
+def test_a_patch_is_one_where_its_pair_has_contacts(tmp_path: Path) -> None:
+    """Of two parts that meet a third one at either end, each has the patch of its end."""
+    x, parts = JOINT.nodes[:, 0], []
+    for name, inside in (("a", x >= 0.0), ("b", x <= 200.0), ("c", x >= 200.0)):
+        parts.append(write_part(tmp_path, name, 40 * np.eye(inside.sum()), flat(JOINT.nodes[inside])))
+    joint = scene_from(parts, contacts=[["a", "b"], ["a", "c"]]).joint
+    csv = tmp_path / "patches.csv"
+    csv.write_text("name,x_min,x_max,y_min,y_max\nleft,0,160,0,120\nright,240,400,0,120\n")
+    patches = patches_of(joint, str(csv))
+    assert [(patch.name, patch.shim.between) for patch in patches] == [
+        ("left a–b", ("a", "b")),
+        ("right a–c", ("a", "c")),
+    ]
 
 
 def test_outlines_are_cut_to_any_shape(strip: Path, tmp_path: Path) -> None:
@@ -321,8 +339,21 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
 def test_stocks_are_lists_or_steps() -> None:
     assert stock_of("0.2,0.3,0.5") == (0.2, 0.3, 0.5)
     assert stock_of("0.05:0.2:0.05") == (0.05, 0.1, 0.15, 0.2)
-    wrong = ["0", "-0.1,0.2", "0.3,0.2", "0.2,0.2", "nan", "0.1:0.5", "0.1:0.5:0", "0.5:0.1:0.1", "x"]
-    for text in ("", *wrong):
+    wrong = [
+        "0",
+        "-0.1,0.2",
+        "0.3,0.2",
+        "0.2,0.2",
+        "nan",
+        "0.1:0.5",
+        "0.1:0.5:0",
+        "0.5:0.1:0.1",
+        "x",
+        "inf",
+        "1e16",
+    ]
+    none: Any = ["", [0.1, 0.2], 0.1, *wrong]
+    for text in none:
         with pytest.raises(InputError, match="ascending"):
             stock_of(text)
 
@@ -392,7 +423,9 @@ def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
             ],
         ),
         (("--patches", "outlines.csv"), ["line 2, outline", "two of its edges cross", "a name of its own"]),
+        (("--patches", "borders.csv"), ["columns x_min, x_max, y_min, y_max, once each"]),
         (("--allow-gap", -1), ["limit_mm", "above 0"]),
+        (("--allow-force", 1e10), ["allow_force", "above 0, at most 1e+09"]),
         (("--patches", "patches.csv", "--missing", 9999), ["--missing: marks = '9999'"]),
         (("--share", 2), ["share", "at most 1"]),
         (("--cases", 10), ["--share", "take 59"]),
@@ -400,6 +433,7 @@ def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
 )
 def test_wrong_questions_are_refused(strip: Path, tmp_path: Path, words: Any, said: list[str]) -> None:
     (tmp_path / "patches.csv").write_text("x_min,x_max,y_min,y_max\n-5,100,0,50\n50,150,0,50\n9,9,0,1\n")
+    (tmp_path / "borders.csv").write_text("xmin,xmax,ymin,ymax\n0,100,0,50\n")
     corners = "a,0,0\na,90,50\na,90,0\na,0,50\n"  # a bow tie
     (tmp_path / "outlines.csv").write_text(f"name,x,y\n{corners}b,100,0\nb,150,0\nb,150,50\n{corners}")
     words = [tmp_path / word if str(word).endswith(".csv") else word for word in words]
@@ -430,6 +464,17 @@ def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path
     assert "--patches: 1, outline" in done.output
     assert "both fill the contact at 50, 0 mm" in " ".join(done.output.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_directory_of_another_command_is_refused_before_patches_are_found(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("harness.shimming.shim_run.PlanSession", lambda _: pytest.fail("solved"))
+    (tmp_path / "plans.jsonl").touch()
+    asked = ("--allow-gap", 0.1, "--stock", "0.1", "--cases", 2, "--share", 1)
+    done = harness("shim", strip, *asked, "--out", tmp_path)
+    assert done.exit_code == 2
+    assert "has plans.jsonl of another command" in " ".join(done.output.split())
 
 
 @pytest.mark.usefixtures("without_report")
@@ -580,3 +625,81 @@ def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:
     (outcome,) = search.outcomes([((0, 0.02),)], [0], 50)
     inside, beyond = outcome.further[0][:2]
     assert inside < beyond == outcome.largest[0]
+
+
+def without_shims(gap_mm: float) -> Step:
+    """Of a case in four patches and beyond them."""
+    figures = (*[gap_mm] * 14, 0.0, 0.0)
+    return Step((), gap_mm, Outcome((gap_mm,), (0,), (gap_mm,), (figures,)))
+
+
+def test_no_shims_that_fresh_cases_refute_fail_by_these(study: ShimStudy) -> None:
+    """None was tried: that none of the stock is found would say too much, beside a gap within the limit."""
+    fresh = Sample(without_shims(0.2), range(1, 40, 2), "held-back rows", 15, (0.5, 0.9), "shim")
+    found = SearchOutcome([without_shims(0.05)], range(0, 40, 2), None, [fresh], [])
+    words, passed = sentence_of(found, Goal(0.1, 0.95), study)
+    assert not passed
+    assert words.startswith("FAIL: joints without a shim keep 0.1 mm in 75.0 % of 20 held-back rows")
+
+
+@pytest.mark.parametrize(("gap_mm", "said"), [(0.2, ", proven."), (inf, ", not proven.")])
+def test_only_what_is_proven_is_said_to_be(study: ShimStudy, gap_mm: float, said: str) -> None:
+    found = SearchOutcome([without_shims(gap_mm)], range(1), None, [], [])
+    words, _ = sentence_of(found, Goal(0.1, 1.0), study)
+    assert words.startswith("FAIL: no shims of the stock are found")
+    assert words.endswith(f"the largest gap in patch 1{said}")
+
+
+PATCH: dict[str, Any] = {
+    "patch": "kept",
+    "outline": [[0, 0], [200, 0], [200, 50], [0, 50]],
+    "area_mm2": 1e4,
+    **{"x_min": 0, "x_max": 200, "y_min": 0, "y_max": 50},
+}
+RECORD: dict[str, Any] = {
+    "title": "a joint",
+    "scene": "joint",
+    "said": "PASS: 1 of 1 joint",
+    "limit_mm": 0.1,
+    "allow_force": None,
+    "allow_stress": None,
+    "taper": False,
+    "stock": [0.1],
+    "sure": [],
+    "samples": [],
+    "forces": [],
+    "before": {"gap": None},
+    "after": {"gap": None},
+    "inputs": {},
+    "marks": [],
+    "bounds": [[0, 0], [200, 50]],
+    "worst_at": "(0, 0) mm",
+    **dict.fromkeys(("machine", "commit", "recorded_at"), ""),
+    "clean": True,
+}
+
+
+def report_of(record: dict[str, Any], out: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """report.md of a record, without its page and sheet."""
+    for name in ("write_page", "write_sheet"):
+        monkeypatch.setattr(shim_report, name, lambda *_: None)
+    (out / "shim.json").write_text(json.dumps(record))
+    return shim_report.write(out).read_text("utf-8")
+
+
+def test_a_patch_may_have_the_name_of_a_column_of_joints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each patch has a column there, too."""
+    figures = {"gap_before_mm": 0.15, "gap_after_mm": 0.05, "liquid_mm3": 1.0}
+    joint = {"joint": 0, "kept": True, "shims": 1, "plan": [[0, 0.1]]}
+    report_of(RECORD | {"joints": [joint], "patches": [PATCH | figures]}, tmp_path, monkeypatch)
+    table = pd.read_csv(tmp_path / "joints.csv")
+    assert list(table.columns) == ["joint", "kept", "shims", "kept, mm"]
+
+
+def test_liquid_shim_that_is_not_known_is_not_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A record has null for a figure of which nothing is proven."""
+    figures = dict.fromkeys(("gap_before_mm", "gap_after_mm", "liquid_mm3")) | {"thickness_mm": 0.1}
+    text = report_of(RECORD | {"patches": [PATCH | figures]}, tmp_path, monkeypatch)
+    assert "– mm³ fill what is left" in text

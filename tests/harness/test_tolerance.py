@@ -139,6 +139,14 @@ def test_bad_questions_are_refused(tmp_path: Path, words: tuple[object, ...], sa
     assert said in wrong_usage("series", write_strip(tmp_path), *words, *common)
 
 
+def test_a_range_is_checked_before_its_first_end_is_solved(tmp_path: Path) -> None:
+    words = "--key", FORCE, "--range", "1:1e16", "--allow-gap", LIMIT, "--cases", 2, "--out", tmp_path / "out"
+    done = harness("tolerance", write_strip(tmp_path), *words)
+    assert done.exit_code == 2
+    assert f"--find {FORCE}: {FORCE} = 1e+16: must be less than" in " ".join(done.output.split())
+    assert not (tmp_path / "out").exists()
+
+
 def test_bisection_finds_the_limit_and_its_interval() -> None:
     """On drawn shares that change one way, rising and falling, of 2 to 60 values and 1 to 300 cases."""
     random = np.random.default_rng(5)

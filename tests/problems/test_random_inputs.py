@@ -106,6 +106,14 @@ def test_the_draws_have_the_distribution(scene: Scene, text: str, law: stats.rv_
         assert abs(np.corrcoef(numbers.T) - np.eye(3)).max() < 4 / np.sqrt(cases.count)
 
 
+def test_the_median_of_each_input_is_said(scene: Scene) -> None:
+    """It tells that a uniform distribution has a width, and no second end."""
+    assert drawn(scene, PRELOAD, PRESSURE).notes == (
+        "fasteners.preload: normal(60, 5), median 60",
+        "pressure.value: uniform(1e-4, scale=1e-4), median 0.00015",
+    )
+
+
 def test_the_cases_of_contributors_exchange_one_input_at_a_time(scene: Scene) -> None:
     few, more = (drawn(scene, PRELOAD, PRESSURE, count=None, contributors=N) for N in (4, 8))
     assert (few.count, more.count) == (4 * 5, 8 * 5)

@@ -10,7 +10,7 @@ import pytest
 from refusals import refusal_of
 from riveted_strips import FORCE, STIFFNESS, C, Tables, approach, joint_scene, strips
 from small_joints import JOINT as PLATES
-from small_joints import make_scene, untied
+from small_joints import make_scene, two_parts, untied
 from superelements import stiffnesses, write_part, write_plates
 
 from harness.scene.solution import solve
@@ -340,6 +340,17 @@ def test_all_bad_stages_at_once(tmp_path: Path) -> None:
         read_scene(str(path))
     bad = [{"name": "1", "on": ["clamp", "rivets[9:]"]}, {"name": "2", "off": ["clamps"]}]
     assert len(refusal_of(joined, bad).faults) == 3
+
+
+def test_an_effect_has_its_number_in_its_own_file(tmp_path: Path) -> None:
+    """Beside those of the file of the assembly, which come first."""
+    clamps = '[[effect]]\nkind = "clamps"\nclamping_force = 1.0\npoints = [[9.0, 9.0]]\n'
+    joint = two_parts().replace("[joint]", "").replace("joint.part", "part")
+    (tmp_path / "joint.toml").write_text(joint + clamps)
+    path = tmp_path / "scene.toml"
+    path.write_text(f'assembly = "joint.toml"\n{clamps}name = "contacts"\n')
+    with pytest.raises(InputError, match=r"scene\.toml: effect\[0\]\.name = 'contacts'"):
+        read_scene(str(path))
 
 
 def test_a_superelement_that_a_stage_leaves_free_is_named_with_the_stage(tmp_path: Path) -> None:

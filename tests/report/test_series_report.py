@@ -155,6 +155,23 @@ def test_a_case_without_an_answer_has_the_largest_gaps_of_the_map_of_a_plan(tmp_
 
 
 @pytest.mark.usefixtures("without_pictures")
+def test_plans_of_which_nothing_is_proven_have_a_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after a stage that is not proven: in their record all gaps are null."""
+    step = {"moved": "all candidates", "fasteners": 3, "gap_mm": None}
+    lists = {name: [] for name in ("plan", "failing", "unproven")}
+    record = {"title": "a joint", "said": "FAIL", "limit_mm": 0.1, "share": 1.0, "count": None, "best": None}
+    record |= {"cases": 1, "chosen_by_share": 1.0, "preload": 40.0, "steps": [step | lists]}
+    record |= {name: [] for name in ("stages", "candidates", "samples", "order")}
+    (tmp_path / "place.json").write_text(json.dumps(record))
+    for name in ("_maps", "_sheet", "write_sheet"):  # of its series
+        monkeypatch.setattr(place_report, name, lambda *_: [])
+    text = place_report.write(tmp_path).read_text("utf-8")
+    assert "| all candidates | 3 | – | no |" in " ".join(text.split())
+
+
+@pytest.mark.usefixtures("without_pictures")
 def test_a_series_without_nodes_has_no_map(tmp_path: Path) -> None:
     made(tmp_path)
     series_file.write_contacts(tmp_path, {"m": np.array(M)})
