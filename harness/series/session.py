@@ -25,11 +25,13 @@ from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.ladders import prefix_of, rung_names
 from problems.load_cases import LoadCases
 from problems.model.fastener_forces import fastener_forces, force_error
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import JointScene, ManufacturedScene, Scene
 from problems.model.springs import Springs
 from problems.reporter import Reporter
+from problems.scene_files import read_scene
 from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver
 
@@ -100,6 +102,20 @@ class Job(SeriesOptions):
     solver_options: dict[str, Any] = field(default_factory=dict)
     key: str = field(default_factory=lambda: uuid4().hex)
     scene_key: str = ""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields for another process, which makes a rung of a ladder anew from its name."""
+        return vars(self) | ({"scene": self.scene.name} if is_rung(self.scene) else {})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        scene = state["scene"]
+        vars(self).update(state | {"scene": read_scene(scene) if isinstance(scene, str) else scene})
+
+
+def is_rung(scene: Scene) -> bool:
+    """Whether matrices in memory are those of a rung of a ladder, which its name makes in any process."""
+    prefix = prefix_of(scene.name) if isinstance(scene, ManufacturedScene) else None
+    return prefix is not None and scene.name in rung_names(prefix)
 
 
 class Result(NamedTuple):

@@ -4,6 +4,7 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psutil
 import pytest
 from commands import harness
@@ -11,6 +12,7 @@ from plugin_commands import LESS_MEMORY, MORE_MEMORY, interrupt, write
 from strip_scene import write_strip
 from suite_runs import all_end
 
+from harness import GapCases, InputError, SeriesOptions, own_matrices, run_series
 from harness.results import series_file
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
@@ -79,6 +81,24 @@ def test_on_workers_too(tmp_path: Path, cluster: Any) -> None:
     assert "ended with exit code 7" in done.output
     assert "2 no answer" in done.output
     assert not any(psutil.Process(nanny.pid).children() for nanny in cluster.workers.values())
+
+
+def test_a_rung_of_a_ladder_is_solved(tmp_path: Path) -> None:
+    """The process of the plug-in makes it from its name."""
+    np.save(tmp_path / "gaps.npy", np.array([[0.0], [1e-3]]))
+    words = ["series", "hard/parts/two-nodes", "--gaps", tmp_path / "gaps.npy", "--out", tmp_path / "out"]
+    done = harness(*words, "--plugin", write(tmp_path), "--solver", "mine", "--check", 0, "--threads", 1)
+    assert done.exit_code == 0, done.output
+    assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within"]
+
+
+def test_matrices_in_memory_are_not_sent_to_a_plug_in(tmp_path: Path) -> None:
+    scene = own_matrices([[100.0]], [[1.0]], [50.0], [0.2])
+    np.save(tmp_path / "gaps.npy", np.array([[0.1]]))
+    options = SeriesOptions(solver="mine", plugin=write(tmp_path))
+    cases = GapCases(gaps=tmp_path / "gaps.npy")
+    with pytest.raises(InputError, match="a scene that another process can read"):
+        run_series(scene, tmp_path / "out", cases, options)
 
 
 def test_a_signal_ends_what_sleeps(tmp_path: Path) -> None:
