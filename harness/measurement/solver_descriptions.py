@@ -16,8 +16,9 @@ from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from harness.results import records
 from harness.results.records import Row
-from harness.results.row_validation import refuse_wrong_kinds
+from harness.results.row_validation import PROBLEM, refuse_wrong_kinds
 from harness.solving.solver_answer import shown
+from harness.verification.reference_problem import PROBLEMS
 from problems.errors import Fault, InputError, read_all
 from problems.forms import FORMS
 from problems.reporter import SILENT, Reporter
@@ -147,16 +148,25 @@ def code_of(solver: Solver) -> str:
     return fingerprint(files, within=["solvers"])
 
 
-NEEDED = ("key", "scene", "status", "time_limit_s", "memory_limit_mib")
+#: What a run reads of its rows: which there are, how searches went, and whether a limit was hit.
+NEEDED = (
+    *("key", "scene", "solver", "form", "tolerance", "repeat"),
+    *("status", "verdict", "time_limit_s", "memory_limit_mib"),
+)
 
 
 def rows_in(directory: Path, console: Console) -> list[Row]:
-    """The rows of DIRECTORY, whose torn last line is removed. Raises InputError."""
-    path = directory / records.MEASUREMENTS
-    if records.remove_torn_line(path):
-        console.print(f"{path}: the last line was cut off, and is measured again.", style="yellow")
-    rows = records.read(path)
-    refuse_wrong_kinds(path, rows, needed=NEEDED)
+    """The rows of DIRECTORY, whose files lose their torn last lines.
+
+    Raises InputError, also if its scenes cannot be read, among which a measured one is recorded.
+    """
+    paths = [directory / name for name in (records.MEASUREMENTS, records.OUTDATED, PROBLEMS)]
+    for path in paths:
+        if records.remove_torn_line(path):
+            console.print(f"{path}: the last line was cut off, and is left out.", style="yellow")
+    rows, problems = records.read(paths[0]), records.read(paths[-1])
+    refuse_wrong_kinds(paths[0], rows, needed=NEEDED)
+    refuse_wrong_kinds(paths[-1], problems, PROBLEM)
     return rows
 
 
@@ -182,7 +192,6 @@ def resumed(
     for row in rows:
         (old if is_old(row) else valid).append(row)
     if old:
-        records.remove_torn_line(directory / records.OUTDATED)
         records.append(directory / records.OUTDATED, *(row | {"answer": None, "log": None} for row in old))
         records.rewrite(directory / records.MEASUREMENTS, valid)
         aside = f"Set aside in {records.OUTDATED}: {counted(len(old), 'row')}"
