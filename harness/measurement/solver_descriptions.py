@@ -86,7 +86,9 @@ def described(
 
     where : the place that names them. requirements : packages of their environment, NAME==VERSION.
     """
-    if not requirements and all(owner_of(name) != "library" for name, _ in solvers):
+    names = {name for name, _ in solvers}
+    plugged = plugin is not None and Path(plugin).stem in names
+    if not (requirements or plugged) and all(owner_of(name) != "library" for name in names):
         return described_here(solvers, None)
     name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None, requirements)
     python = interpreter(requirements, reporter)

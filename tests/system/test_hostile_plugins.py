@@ -110,6 +110,17 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
         described([("mine", {})], tmp_path / "mine.py", "test")
 
 
+@pytest.mark.parametrize("name", ["newton", "piqp"])
+def test_a_plug_in_with_the_name_of_a_solver_of_the_package_is_bad_input(tmp_path: Path, name: str) -> None:
+    """Before anything is measured, as that solver or not at all."""
+    plugin = tmp_path / f"{name}.py"
+    plugin.write_text(tiny_joint.EXACT)
+    suite, out = tiny_joint.write_suite(tmp_path), tmp_path / "out"
+    done = harness("run", suite, "--plugin", plugin, "--solver", name, "--out", out)
+    assert (done.exit_code, out.exists()) == (2, False)
+    assert "is taken by a solver of the package: rename the file" in done.stderr
+
+
 @pytest.mark.parametrize("what", ["check", "run"])
 def test_an_interrupt_ends_what_sleeps(tmp_path: Path, what: str) -> None:
     """While a solver sleeps in `check`, and while `run` waits for an import."""
