@@ -254,7 +254,7 @@ def summary(rows: list[Row], console: Console) -> int:
     """Print how many rows there are of each verdict; the exit code, 3 if none could be judged."""
     counts = Counter(row["verdict"] for row in rows)
     words = (f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items())
-    console.print(f"Verdicts: {', '.join(words)}.")
+    console.print(f"Verdicts: {', '.join(words) or 'none'}.")
     if counts["within"] + counts["outside"]:
         return DONE
     why = "no row has an answer"
