@@ -167,7 +167,8 @@ def run_series(
         reporter.say(sentence)
     threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
     plugin = Path(options.plugin).absolute() if options.plugin else None  # workers may be elsewhere
-    settled = {"form": choice.form, "threads": threads, "plugin": plugin}
+    settled: dict[str, Any] = {"form": choice.form, "threads": threads, "plugin": plugin}
+    settled |= {"plugin_version": made.version} if plugin else {}
     job = Job(**vars(options) | settled, scene=read, cases=chosen)
     facts = {"solver_version": made.version, "solver_code": made.code}
     files = fingerprints(inputs) if report else {}  # now: they may change meanwhile

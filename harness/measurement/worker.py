@@ -29,7 +29,7 @@ from problems.model.scene import Scene
 from problems.reporter import Reporter
 from problems.scene_files import read_scene
 from solvers.base import Answer
-from solvers.registry import make_solver
+from solvers.registry import make_solver, solver_version
 
 from .child_process import Events
 from .environments import interpreter
@@ -47,12 +47,13 @@ SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib", "device")
 class FinishedReport(Report, total=False):
     """A report at its end.
 
-    cannot_save : why the answer's file cannot be written, which ends the run. printed : by the process, with
-    the first of its measurements.
+    cannot_save : why the answer's file cannot be written, which ends the run. With the first measurement of a
+    process: printed, what it printed; plugin_version, that of the plug-in's file when the process read it.
     """
 
     cannot_save: str
     printed: str
+    plugin_version: str
 
 
 class Unsupported(InvalidAnswer):
@@ -115,6 +116,8 @@ class Run(Reporter):
         """Solve the load cases; yields the last event of each row."""
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
+        if plugin and plugin.stem == m.solver:
+            self.events.report(plugin_version=solver_version(m.solver, plugin))
         solver = make_solver(m.solver, m.entry.options, plugin)
         own = {"time_limit_s": OWN_LIMIT * m.time_limit_s, "iteration_limit": m.iteration_limit}
         vars(solver).update(own, prints=True)  # it may be frozen

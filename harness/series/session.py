@@ -92,13 +92,15 @@ class SeriesOptions:
 class Job(SeriesOptions):
     """The cases of a series, and how they are solved.
 
-    threads : None: as they are. scene_key : that of the scene at the beginning; "": not told.
+    threads : None: as they are. scene_key, plugin_version : those of the scene and of the plug-in's file at
+    the beginning; "": not told.
     """
 
     scene: Scene
     cases: LoadCases
     form: Form
     plugin: Path | None = None
+    plugin_version: str = ""
     solver_options: dict[str, Any] = field(default_factory=dict)
     key: str = field(default_factory=lambda: uuid4().hex)
     scene_key: str = ""

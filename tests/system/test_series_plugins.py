@@ -14,6 +14,10 @@ from suite_runs import all_end
 
 from harness import GapCases, InputError, SeriesOptions, own_matrices, run_series
 from harness.results import series_file
+from harness.series.executors import solve_isolated
+from harness.series.session import Job
+from problems.load_cases.random_gaps import random_gaps
+from problems.scene_files import read_scene
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
@@ -99,6 +103,15 @@ def test_matrices_in_memory_are_not_sent_to_a_plug_in(tmp_path: Path) -> None:
     cases = GapCases(gaps=tmp_path / "gaps.npy")
     with pytest.raises(InputError, match="a scene that another process can read"):
         run_series(scene, tmp_path / "out", cases, options)
+
+
+def test_another_plug_in_than_the_one_described_is_refused(tmp_path: Path) -> None:
+    """It was edited meanwhile, or is older on a worker: a series is of one solver."""
+    scene = read_scene(str(write_strip(tmp_path)))
+    plugin: Any = {"solver": "mine", "plugin": write(tmp_path), "plugin_version": "sha256:of another"}
+    job = Job(**plugin, scene=scene, cases=random_gaps(scene, 2, 0), form="dual", check=0, threads=1)
+    with pytest.raises(InputError, match=r"mine\.py: plugin = 'another': that which the series has read"):
+        list(solve_isolated(job, [0, 1]))
 
 
 def test_a_signal_ends_what_sleeps(tmp_path: Path) -> None:
