@@ -27,7 +27,7 @@ from problems.errors import InputError
 from problems.forms import form_family
 from problems.input.bounded_types import Positive
 from report.document.escape import markdown, quoted, short
-from report.document.numbers import counted, digits_beside, out_of, upwards
+from report.document.numbers import counted, error_beside, out_of, upwards
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
@@ -233,7 +233,7 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
             known = f"the reference is known only to {upwards(bound, 1)} mm"
             why = f"{known}, not to {REFERENCE_SHARE * limit:.3g}"
         case "outside":
-            why = f"{_beside(limit, judgement.displacement_error_mm)} mm from the reference"
+            why = f"{error_beside(limit, judgement.displacement_error_mm or 0.0)} mm from the reference"
         case _:
             why = ""
     return Finding(row["key"], judgement, limit, why)
@@ -249,13 +249,9 @@ def table(findings: list[Finding]) -> Table:
 
 
 def _cells(finding: Finding) -> tuple[str, ...]:
-    shown = _beside(finding.limit_mm, finding.judgement.displacement_error_mm)
-    return finding.key, shown, f"{finding.limit_mm:.3g}", finding.judgement.verdict, finding.why
-
-
-def _beside(limit_mm: float, error_mm: float | None) -> str:
-    """An error, with the digits that show it on its side of the limit."""
-    return "–" if error_mm is None else f"{error_mm:.{max(digits_beside(limit_mm, error_mm), 4) - 1}e}"
+    error, limit = finding.judgement.displacement_error_mm, finding.limit_mm
+    shown = "–" if error is None else error_beside(limit, error)
+    return finding.key, shown, f"{limit:.3g}", finding.judgement.verdict, finding.why
 
 
 def append_summary(path: Path, outcome: GateOutcome) -> None:

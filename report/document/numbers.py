@@ -73,6 +73,11 @@ def on_its_side(value: float, limit: float) -> str:
     return f"{value:.{digits_beside(limit, value)}g}"
 
 
+def error_beside(limit: float, error: float) -> str:
+    """1.00004e-07 beside 1e-07: four digits, or as many as show an error on its side of a limit."""
+    return f"{error:.{max(digits_beside(limit, error), 4) - 1}e}"
+
+
 def beside(limit: float) -> Callable[[object], str]:
     """Shows values with the digits that show them on their sides of a limit."""
     return lambda value: significant(value, digits_beside(limit, as_number(value) or 0.0))

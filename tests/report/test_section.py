@@ -14,6 +14,7 @@ from report.document.blocks import Table, number, word
 from report.document.numbers import (
     beside,
     coordinate,
+    error_beside,
     extent,
     position,
     raised,
@@ -207,6 +208,8 @@ def test_no_bound_is_rounded_down_or_far() -> None:
 def test_a_value_is_shown_on_its_side_of_a_limit() -> None:
     said = [beside(0.05)(value) for value in (0.0512, 0.05004, 0.05, 0.04999)]
     assert said == ["0.0512", "0.05004", "0.0500", "0.0500"]
+    errors = [error_beside(1e-7, value) for value in (2e-7, 1.000004e-7, 1e-7, 3.21e-12)]
+    assert errors == ["2.000e-07", "1.000004e-07", "1.000e-07", "3.210e-12"]
 
 
 def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:
