@@ -20,8 +20,8 @@ from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, cpu_model, resident_mib
 from harness.results.records import Row, replace_arrays
 from harness.results.schema import Report
-from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures
-from harness.solving.solver_session import SolverSession
+from harness.solving.solver_answer import InvalidAnswer, figures
+from harness.solving.solver_session import SolverSession, given_arrays
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
@@ -131,19 +131,19 @@ class Run(Reporter):
             if problem.prepared.model_s is not None:
                 self.events.report(model_s=problem.prepared.model_s + time.perf_counter() - start)
             read_all_pages(problem.arrays)
-            stored = StoredFiles(problem.arrays)
+        given = given_arrays(problem)
         session = SolverSession(solver, problem, m.tolerance, self)
         batched = m.entry.batched
         if batched is None:
             for case, file in zip(cases, files, strict=True):
                 outcome = self.solved(session, case, file)
-                stored.check()
+                given.check()
                 yield outcome
             return
         for start in range(0, len(cases), batched):
             some = slice(start, start + batched)
             for outcome in self.solved_batch(session, cases[some], files[some]):
-                stored.check()
+                given.check()
                 yield outcome
 
     def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> FinishedReport:

@@ -8,7 +8,6 @@ from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -20,7 +19,6 @@ from harness.measurement.worker import START_S
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.solving.call_lock import in_turn
-from harness.solving.solver_answer import StoredFiles
 from harness.terminal.console import ConsoleReporter
 from harness.verification.reference import proof_of
 from problems.build import prepared
@@ -102,14 +100,7 @@ def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
     """Solve the cases of a task in the child process; each result is an event."""
     job, numbers, batched = task
     refuse_other_files(job)
-
-    def report(**event: Any) -> None:
-        events.report(**event)
-        if event["phase"] == "judging":
-            stored.check()
-
-    session = SeriesSession(job, report=report, batched=batched)
-    stored = StoredFiles(session.problem.arrays)
+    session = SeriesSession(job, report=events.report, batched=batched)
     for some in session.solve(numbers):
         for result in some:
             events.report(row=result.row, gap=result.gap)

@@ -5,7 +5,7 @@ each case from the nearest of the answers so far.
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 from uuid import uuid4
@@ -16,7 +16,7 @@ import threadpoolctl
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.results.series_file import Gaps
-from harness.solving.solver_session import SolverSession
+from harness.solving.solver_session import SolverSession, given_arrays
 from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import best_of_candidates, proof_of
@@ -24,7 +24,7 @@ from harness.verification.reference_problem import refuse_without_contacts
 from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
+from problems.forms.problem import in_form, read_only
 from problems.ladders import prefix_of, rung_names
 from problems.load_cases import LoadCases
 from problems.model.fastener_forces import fastener_forces, force_error
@@ -138,7 +138,8 @@ class Attempt:
 class SeriesSession(Reporter):
     """A job in this process.
 
-    solver : made by the caller, or else by its name. report : called with phase="solve" and `cases` where
+    solver : made by the caller, or else by its name. report : of a plug-in, which is given copies of the load
+    cases, as compiled code may write into them; called with phase="solve" and `cases` where
     the solver begins, so that each case can have its time limit, and with phase="judging" where it ends; a
     case is then judged as soon as it is solved, unless several are solved at once. batched : whether a solver
     that can solve several at once does.
@@ -161,6 +162,7 @@ class SeriesSession(Reporter):
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.solver_options, job.plugin)
         self.row: Row = {}  # of the case being solved
+        self.given = given_arrays(self.problem) if report else None
         self.session = SolverSession(solver, self.problem, job.tolerance, self, KEPT_ANSWERS)
         self.session.open(batched)
 
@@ -199,7 +201,7 @@ class SeriesSession(Reporter):
         self.report(phase="solve", times=len(loads), cases=[case for case, _ in loads])
         start = time.perf_counter()
         try:
-            answers = self.session.solve_batch([load for _, load in loads])
+            answers = self.session.solve_batch([self._own(load) for _, load in loads])
         except Exception:
             return [self._try(case, load) for case, load in loads]
         share = (time.perf_counter() - start) / len(loads)
@@ -211,6 +213,13 @@ class SeriesSession(Reporter):
     def _new_row(self, case: int) -> Row:
         return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
 
+    def _own(self, load: LoadCase) -> LoadCase:
+        """The load case for the solver: a copy for a plug-in."""
+        if self.given is None:
+            return load
+        arrays = {name: value.copy() for name, value in vars(load).items() if isinstance(value, np.ndarray)}
+        return read_only(replace(load, **arrays))
+
     def _try(self, case: int, load: LoadCase) -> Attempt:
         """Solve one; if the solver raises, its status is `failed`, or `memory_limit` if memory runs out."""
         self.report(phase="solve", cases=[case])
@@ -219,7 +228,7 @@ class SeriesSession(Reporter):
         if near is not None:
             self.row["warm_from"] = near.case
         try:
-            answer = self.session.next(load, near, case)
+            answer = self.session.next(self._own(load), near, case)
         except Exception as error:
             self.session.forget()
             answer = failed(f"{type(error).__name__}: {error}"[:500])
@@ -234,6 +243,8 @@ class SeriesSession(Reporter):
     def assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
         """The proven answers of those that are whole, by the number of the case."""
         self.report(phase="judging")
+        if self.given is not None:
+            self.given.check()
         start = time.perf_counter()
         needs = self.problem.needs
         answered = [one for one in attempts if all(getattr(one.answer, name) is not None for name in needs)]

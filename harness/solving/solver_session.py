@@ -22,7 +22,7 @@ from problems.forms.solver_units import Units
 from problems.reporter import SILENT, Reporter
 from solvers.base import Answer, Batch, Solver, WarmStart
 
-from .solver_answer import InvalidAnswer, checked
+from .solver_answer import GivenArrays, InvalidAnswer, checked
 
 NO_ANSWER = "gave no answer; try another solver or form"
 NO_CONTACT = "no contact closes"
@@ -181,6 +181,13 @@ def _array(value: Any) -> Any:
     except Exception:  # of a class of the user's
         return value
     return array if array.dtype.kind in "fiu" else value
+
+
+def given_arrays(problem: Problem) -> GivenArrays:
+    """The arrays of a problem that a solver is given, made read-only."""
+    protect(problem)
+    A = problem.assembly.A
+    return GivenArrays([*problem.arrays, A.data, A.indices, A.indptr])
 
 
 def protect(problem: Problem) -> None:
