@@ -21,7 +21,7 @@ from harness.results.provenance import blas_kernels, cpu_model, resident_mib
 from harness.results.records import Row, replace_arrays
 from harness.results.schema import Report
 from harness.solving.solver_answer import InvalidAnswer, figures
-from harness.solving.solver_session import SolverSession, given_arrays
+from harness.solving.solver_session import SolverSession, copied, given_arrays
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
@@ -155,7 +155,7 @@ class Run(Reporter):
         near = session.nearest(load)
         began = time.monotonic()
         self.begin(session)
-        answer = session.next(load, near)
+        answer = session.next(copied(load), near)
         stopped = answer.status != "solved" and time.monotonic() - began >= session.solver.time_limit_s
         x = answer.x
         if "x" not in problem.needs and answer.lam is not None:
@@ -173,7 +173,7 @@ class Run(Reporter):
         """Solve load cases at once and save their answers; each has an equal share of the time."""
         problem = session.problem
         start = time.perf_counter()
-        loads = problem.loads(cases)
+        loads = [copied(load) for load in problem.loads(cases)]
         form_s = time.perf_counter() - start
 
         warm = session.opened

@@ -5,7 +5,7 @@ each case from the nearest of the answers so far.
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 from uuid import uuid4
@@ -16,7 +16,7 @@ import threadpoolctl
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.results.series_file import Gaps
-from harness.solving.solver_session import SolverSession, given_arrays
+from harness.solving.solver_session import SolverSession, copied, given_arrays
 from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import best_of_candidates, proof_of
@@ -24,7 +24,7 @@ from harness.verification.reference_problem import refuse_without_contacts
 from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form, read_only
+from problems.forms.problem import in_form
 from problems.ladders import prefix_of, rung_names
 from problems.load_cases import LoadCases
 from problems.model.fastener_forces import fastener_forces, force_error
@@ -215,10 +215,7 @@ class SeriesSession(Reporter):
 
     def _own(self, load: LoadCase) -> LoadCase:
         """The load case for the solver: a copy for a plug-in."""
-        if self.given is None:
-            return load
-        arrays = {name: value.copy() for name, value in vars(load).items() if isinstance(value, np.ndarray)}
-        return read_only(replace(load, **arrays))
+        return load if self.given is None else copied(load)
 
     def _try(self, case: int, load: LoadCase) -> Attempt:
         """Solve one; if the solver raises, its status is `failed`, or `memory_limit` if memory runs out."""

@@ -17,7 +17,7 @@ from problems.errors import InputError
 from problems.forms import Form, default_form
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Problem, in_form
+from problems.forms.problem import Problem, in_form, read_only
 from problems.forms.solver_units import Units
 from problems.reporter import SILENT, Reporter
 from solvers.base import Answer, Batch, Solver, WarmStart
@@ -181,6 +181,12 @@ def _array(value: Any) -> Any:
     except Exception:  # of a class of the user's
         return value
     return array if array.dtype.kind in "fiu" else value
+
+
+def copied(load: LoadCase) -> LoadCase:
+    """A read-only copy for a solver: what compiled code writes into it changes no other load case."""
+    arrays = {name: value.copy() for name, value in vars(load).items() if isinstance(value, np.ndarray)}
+    return read_only(replace(load, **arrays))
 
 
 def given_arrays(problem: Problem) -> GivenArrays:
