@@ -181,6 +181,16 @@ def test_a_step_that_raises_is_named_with_its_line() -> None:
     assert "test_check.py, line" in words
 
 
+def test_an_error_within_a_library_is_named_with_the_line_that_calls_it() -> None:
+    class Raises(Sound):
+        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
+            return np.linalg.cholesky(-np.eye(2))
+
+    words = words_of(Raises, ("dual",))
+    assert "setup: raised LinAlgError" in words
+    assert "test_check.py, line" in words
+
+
 def test_wrong_forms_and_a_failing_constructor() -> None:
     class Wrong(Sound):
         forms = ("both",)  # type: ignore[assignment]
