@@ -259,7 +259,7 @@ def summary(rows: list[Row], console: Console) -> int:
         return DONE
     why = "no row has an answer"
     if unjudged := [row for row in rows if row["verdict"] == "cannot_be_judged"]:
-        bounds = (row["reference_bound_mm"] for row in unjudged)  # null is an infinite one
+        bounds = (row.get("reference_bound_mm") for row in unjudged)  # null is an infinite one
         least = min(inf if bound is None else bound for bound in bounds)
         proven = "no reference is proven"
         if least < inf:

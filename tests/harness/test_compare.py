@@ -192,8 +192,8 @@ def test_the_answer_that_a_search_keeps_is_compared(
 @pytest.mark.parametrize(
     ("tried", "kept"),
     [
-        ({"one": {1e-5: "outside"}, "other": {1e-6: "within"}}, [1e-6]),
-        ({"one": {1e-5: "outside", 1e-6: "within"}, "other": {1e-6: "outside", 1e-7: "within"}}, [1e-6, 1e-7]),
+        ({"a": {1e-5: "outside"}, "b": {1e-6: "within"}}, [1e-6]),
+        ({"a": {1e-5: "outside", 1e-6: "within"}, "b": {1e-6: "outside", 1e-7: "within"}}, [1e-6, 1e-7]),
     ],
 )
 def test_workers_on_two_machines_share_a_search_and_merged_runs_do_not(
