@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
-from harness.solving.solver_session import SolverSession
+from harness.solving.solver_session import OTHER_NAME, SolverSession, replaced
 from harness.verification.judge import LIMIT_MM
 from problems import ROOT
 from problems.errors import InputError, refuse_text
@@ -94,7 +94,8 @@ def findings(
 ) -> Iterator[Finding]:
     """Each fault as soon as it shows. begin : called with the form and the name of each problem before it."""
     try:
-        taken = factory().forms
+        made = factory()
+        taken, own = made.forms, {name: shown(getattr(made, name)) for name in replaced(made)}
     except InputError:
         raise
     except (Exception, SystemExit) as error:
@@ -104,6 +105,8 @@ def findings(
         fix = 'Set it to a tuple of "primal", "dual" and "sparse", e.g. forms = ("dual",)'
         yield Finding("any", "forms", f"forms is {shown(taken)}", fix)
         return
+    for name, value in own.items():
+        yield Finding("any", name, f"{name} is {value}", OTHER_NAME)
     for form in [form for form in taken if form in forms]:
         try:
             for trial in known_problems(form):

@@ -18,6 +18,7 @@ from harness.results import records
 from harness.results.records import Row
 from harness.results.row_validation import PROBLEM, refuse_wrong_kinds
 from harness.solving.solver_answer import shown
+from harness.solving.solver_session import OTHER_NAME, replaced
 from harness.verification.reference_problem import PROBLEMS
 from problems.errors import Fault, InputError, read_all
 from problems.forms import FORMS
@@ -134,6 +135,8 @@ def described_here(
         if not isinstance(forms, tuple | list) or not forms or not all(form in FORMS for form in forms):
             allowed = f"a tuple of {', '.join(FORMS)}"
             raise InputError.one(f"solver {name}", "forms", shown(forms), allowed)
+        for key in replaced(solver):
+            raise InputError.one(f"solver {name}", key, shown(getattr(solver, key)), OTHER_NAME)
         return Description(list(forms), solver_version(name, plugin), code_of(solver), owner_of(name))
 
     return read_all(describe_one, solvers)

@@ -30,6 +30,9 @@ NO_CONTACT = "no contact closes"
 DENSE = ("newton", "ipm-fast", "ipm", "gi")
 SPARSE = ("newton", "mprgp")
 TOLERANCE_MM = 1e-11  # of these methods
+#: Attributes of solvers.base.Solver that a run sets.
+SET_BY_RUNS = ("time_limit_s", "iteration_limit", "prints")
+OTHER_NAME = "Choose another name: a run replaces it. self.most(LIMIT) has its limit on iterations and yours"
 
 
 @dataclass(frozen=True)
@@ -181,6 +184,11 @@ def _array(value: Any) -> Any:
     except Exception:  # of a class of the user's
         return value
     return array if array.dtype.kind in "fiu" else value
+
+
+def replaced(solver: Solver) -> list[str]:
+    """The attributes of a solver to which it has given values of its own, and a run gives others."""
+    return [name for name in SET_BY_RUNS if getattr(solver, name) != getattr(Solver, name)]
 
 
 def copied(load: LoadCase) -> LoadCase:

@@ -203,6 +203,15 @@ def test_wrong_forms_and_a_failing_constructor() -> None:
     assert "constructor: raised KeyError" in words_of(Fails)
 
 
+def test_a_limit_of_its_own_that_a_run_replaces() -> None:
+    class Limited(Sound):
+        def __init__(self) -> None:
+            super().__init__()
+            self.iteration_limit = 500
+
+    assert "iteration_limit is 500. Choose another name" in words_of(Limited, ("dual",))
+
+
 def test_load_cases_at_once_in_another_order() -> None:
     class Turned(Sound):
         def batched(self, state: Any) -> Any:

@@ -110,6 +110,14 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
         described([("mine", {})], tmp_path / "mine.py", "test")
 
 
+def test_an_option_with_the_name_of_what_a_run_sets_is_bad_input(tmp_path: Path) -> None:
+    """The run would replace its value without a word."""
+    limited = "\n    def __init__(self, iteration_limit=500):\n        self.iteration_limit = iteration_limit\n"
+    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + limited)
+    with pytest.raises(InputError, match="solver mine: iteration_limit = '500': Choose another name"):
+        described([("mine", {})], tmp_path / "mine.py", "test")
+
+
 @pytest.mark.parametrize("name", ["newton", "piqp"])
 def test_a_plug_in_with_the_name_of_a_solver_of_the_package_is_bad_input(tmp_path: Path, name: str) -> None:
     """Before anything is measured, as that solver or not at all."""
