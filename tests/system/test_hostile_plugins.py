@@ -112,9 +112,9 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
 
 def test_an_option_with_the_name_of_what_a_run_sets_is_bad_input(tmp_path: Path) -> None:
     """The run would replace its value without a word."""
-    limited = "\n    def __init__(self, iteration_limit=500):\n        self.iteration_limit = iteration_limit\n"
-    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + limited)
-    with pytest.raises(InputError, match="solver mine: iteration_limit = '500': Choose another name"):
+    printing = "\n    def __init__(self, prints=True):\n        self.prints = prints\n"
+    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + printing)
+    with pytest.raises(InputError, match="solver mine: prints = 'True': Choose another name"):
         described([("mine", {})], tmp_path / "mine.py", "test")
 
 
