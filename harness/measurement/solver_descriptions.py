@@ -15,6 +15,7 @@ from rich.console import Console
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from harness.results import records
+from harness.results.provenance import installed_version
 from harness.results.records import Row
 from harness.results.row_validation import PROBLEM, refuse_wrong_kinds
 from harness.solving.solver_answer import shown
@@ -137,9 +138,17 @@ def described_here(
             raise InputError.one(f"solver {name}", "forms", shown(forms), allowed)
         for key in replaced(solver):
             raise InputError.one(f"solver {name}", key, shown(getattr(solver, key)), OTHER_NAME)
-        return Description(list(forms), solver_version(name, plugin), code_of(solver), owner_of(name))
+        return Description(list(forms), version_of(name, solver, plugin), code_of(solver), owner_of(name))
 
     return read_all(describe_one, solvers)
+
+
+def version_of(name: str, solver: Solver, plugin: Path | None) -> str:
+    """The version of a solver; of a plug-in that of its files, and of the distribution that it names."""
+    version = solver_version(name, plugin)
+    if plugin is None or plugin.stem != name or not solver.distribution:
+        return version
+    return f"{version} {solver.distribution}=={installed_version(solver.distribution)}"
 
 
 def code_of(solver: Solver) -> str:

@@ -67,8 +67,8 @@ def run_task(task: Task, answers: Path) -> TaskResult:
         reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
     elif first.form in forms:
         reports = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
-        version = reports[0].get("plugin_version", task.solver.version)
-        if version != task.solver.version and not first.entry.requirements:
+        version, described = reports[0].get("plugin_version"), task.solver.version.partition(" ")[0]
+        if version not in (None, described) and not first.entry.requirements:
             raise InputError.one(first.suite.plugin, "plugin", "another", AS_READ)
     else:
         reports = [{"status": "unsupported", "message": f"takes {' and '.join(forms)} only"}] * len(batch)

@@ -126,7 +126,8 @@ def refuse_other_files(job: Job) -> None:
     if job.scene_key not in ("", job.scene.key):
         allowed = "those that the series has read: they have changed since, or are others on this worker"
         raise InputError.one(job.scene.source_of("K"), "matrices", "others", allowed)
-    if job.plugin and job.plugin_version not in ("", solver_version(job.solver, job.plugin)):
+    described = job.plugin_version.partition(" ")[0]  # the rest is the version of a distribution
+    if job.plugin and described not in ("", solver_version(job.solver, job.plugin)):
         allowed = "that which the series has read: it has changed since, or is another on this worker"
         raise InputError.one(job.plugin, "plugin", "another", allowed)
 

@@ -4,6 +4,7 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tiny_joint
 from commands import harness
@@ -15,6 +16,7 @@ import harness.measurement.solver_descriptions as describing
 from harness import InputError
 from harness.measurement.solver_descriptions import describe, described
 from harness.planning.suite import read_suite
+from solvers.registry import solver_version
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
@@ -108,6 +110,13 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
     with pytest.raises(InputError, match="solver mine: forms"):
         described([("mine", {})], tmp_path / "mine.py", "test")
+
+
+def test_a_plug_in_has_the_version_of_the_distribution_that_it_names(tmp_path: Path) -> None:
+    """Behind that of its own files: an upgrade outdates its rows."""
+    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + '\n    distribution = "numpy"\n')
+    (found,) = described([("mine", {})], tmp_path / "mine.py", "test")
+    assert found.version == f"{solver_version('mine', tmp_path / 'mine.py')} numpy=={np.__version__}"
 
 
 def test_an_option_with_the_name_of_what_a_run_sets_is_bad_input(tmp_path: Path) -> None:
