@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import NOTHING_WRITTEN, error_reporting, option
+from .options import error_reporting, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,7 +76,7 @@ def merge(
     Exit codes: 0 written, 2 wrong usage or bad input,
                 5 no measurement in common, other problems or limits, or one machine measured twice.
     """
-    with error_reporting(*NOTHING_WRITTEN) as console:
+    with error_reporting("", "Interrupted: `report` takes the merged rows, if they are there.") as console:
         from harness.commands.merged_runs import merge as merge_runs
 
         console.print(f"Report: {merge_runs(directories, out)}")

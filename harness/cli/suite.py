@@ -82,7 +82,7 @@ def run(
 
     \b
     Exit codes: 0 measured, 1 incomplete: workers were lost, 2 wrong usage or bad input,
-                3 nothing could be judged, 130 interrupted.
+                3 no row has an answer that can be judged, 130 interrupted.
     """
     with resumable() as console:
         from harness.commands.suite_runs import run as run_suite
@@ -164,9 +164,9 @@ def gate(
     Exit codes:
       0  every gated row is within 1e-7 mm (on a rung of a ladder, within what conditioning allows)
       1  accuracy lost: a gated row is outside, cannot be judged, has no answer, was never measured, or is
-         worse or slower than the baseline
+         worse or slower than the baseline; others can be judged
       2  wrong usage or bad input
-      3  nothing could be judged, or with --max-slowdown a time could not be compared
+      3  no gated row has an answer that can be judged, or nothing, or a time, can be compared
       5  the baseline has none of these measurements, other problems or other limits
     """
     with error_reporting(*NOTHING_WRITTEN) as console:

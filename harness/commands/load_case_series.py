@@ -19,7 +19,7 @@ from harness.scene.solution import Source, load_scene
 from harness.series.derivatives import derivatives
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
-from harness.series.session import Job, SeriesOptions
+from harness.series.session import Job, SeriesOptions, is_rung
 from harness.solving.call_lock import keeps_threads
 from harness.terminal import DONE
 from harness.terminal.console import console_of
@@ -126,8 +126,8 @@ def run_series(
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
     faults += unused(options.plugin, [solver])
-    if options.plugin and isinstance(read, ManufacturedScene):
-        allowed = "a scene in a file, which another process can read: `export` makes one"
+    if options.plugin and isinstance(read, ManufacturedScene) and not is_rung(read):
+        allowed = "a scene that another process can read, by its name or from a file: `export` makes one"
         faults.append(Fault("--plugin", "scene", read.name, allowed))
     for name, value, usual in (
         ("time-limit", options.time_limit_s, STANDARD.time_limit_s),
@@ -167,7 +167,8 @@ def run_series(
         reporter.say(sentence)
     threads = options.threads or threads_per_worker(scheduler) or (1 if choice.form == "sparse" else 2)
     plugin = Path(options.plugin).absolute() if options.plugin else None  # workers may be elsewhere
-    settled = {"form": choice.form, "threads": threads, "plugin": plugin}
+    settled: dict[str, Any] = {"form": choice.form, "threads": threads, "plugin": plugin}
+    settled |= {"plugin_version": made.version} if plugin else {}
     job = Job(**vars(options) | settled, scene=read, cases=chosen)
     facts = {"solver_version": made.version, "solver_code": made.code}
     files = fingerprints(inputs) if report else {}  # now: they may change meanwhile

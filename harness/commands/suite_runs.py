@@ -29,7 +29,7 @@ class SuiteOutcome:
     directory : Path
         Where its rows, answers and report are.
     code : int
-        Exit code of the command: 0 measured, 1 workers were lost, 3 nothing could be judged.
+        Exit code of the command: 0 measured, 1 workers were lost, 3 no row has an answer that can be judged.
     report : Path, optional
         The report, in Markdown; None if nothing was measured.
     """

@@ -1,17 +1,20 @@
 """Checks a solver on small problems with known answers; each fault is a finding in plain words."""
 
 import math
+import sysconfig
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
-from harness.solving.solver_session import SolverSession
+from harness.solving.solver_session import OTHER_NAME, SolverSession, replaced
 from harness.verification.judge import LIMIT_MM
+from problems import ROOT
 from problems.errors import InputError, refuse_text
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
@@ -91,7 +94,8 @@ def findings(
 ) -> Iterator[Finding]:
     """Each fault as soon as it shows. begin : called with the form and the name of each problem before it."""
     try:
-        taken = factory().forms
+        made = factory()
+        taken, own = made.forms, {name: shown(getattr(made, name)) for name in replaced(made)}
     except InputError:
         raise
     except (Exception, SystemExit) as error:
@@ -101,6 +105,8 @@ def findings(
         fix = 'Set it to a tuple of "primal", "dual" and "sparse", e.g. forms = ("dual",)'
         yield Finding("any", "forms", f"forms is {shown(taken)}", fix)
         return
+    for name, value in own.items():
+        yield Finding("any", name, f"{name} is {value}", OTHER_NAME)
     for form in [form for form in taken if form in forms]:
         try:
             for trial in known_problems(form):
@@ -237,11 +243,25 @@ WAYS = {
 
 
 def _raised(form: str, step: str, error: BaseException) -> Finding:
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    what = f"raised {error_text(error)} ({last.filename}, line {last.lineno})"
+    place = _place(error)
+    what = f"raised {error_text(error)} ({place.filename}, line {place.lineno})"
     if "read-only" in what:
         return Finding(form, step, what, "The problem's arrays are shared and read-only: copy, then write")
     return Finding(form, step, what, "A solver that cannot go on returns Answer('failed', None)")
+
+
+def _place(error: BaseException) -> traceback.FrameSummary:
+    """The deepest line of the solver's author, who reads it, not that of a library which was called there."""
+    frames = [*traceback.extract_tb(error.__traceback__)]
+    called = [frame for frame in frames if ROOT / "harness" not in Path(frame.filename).parents]
+    own = [frame for frame in called if not _is_installed(Path(frame.filename))]
+    return (own or called[:1] or frames)[-1]
+
+
+def _is_installed(file: Path) -> bool:
+    """Whether a file is of an installed package or of the standard library."""
+    installed = {"site-packages", "dist-packages"} & {*file.parts}
+    return bool(installed) or Path(sysconfig.get_path("stdlib")) in file.parents
 
 
 def _apart(one: Answer, other: Answer, trial: KnownProblem, case: KnownCase) -> float:

@@ -15,9 +15,12 @@ from rich.console import Console
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from harness.results import records
+from harness.results.provenance import installed_version
 from harness.results.records import Row
-from harness.results.row_validation import refuse_wrong_kinds
+from harness.results.row_validation import PROBLEM, refuse_wrong_kinds
 from harness.solving.solver_answer import shown
+from harness.solving.solver_session import OTHER_NAME, replaced
+from harness.verification.reference_problem import PROBLEMS
 from problems.errors import Fault, InputError, read_all
 from problems.forms import FORMS
 from problems.reporter import SILENT, Reporter
@@ -85,7 +88,9 @@ def described(
 
     where : the place that names them. requirements : packages of their environment, NAME==VERSION.
     """
-    if not requirements and all(owner_of(name) != "library" for name, _ in solvers):
+    names = {name for name, _ in solvers}
+    plugged = plugin is not None and Path(plugin).stem in names
+    if not (requirements or plugged) and all(owner_of(name) != "library" for name in names):
         return described_here(solvers, None)
     name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None, requirements)
     python = interpreter(requirements, reporter)
@@ -131,9 +136,19 @@ def described_here(
         if not isinstance(forms, tuple | list) or not forms or not all(form in FORMS for form in forms):
             allowed = f"a tuple of {', '.join(FORMS)}"
             raise InputError.one(f"solver {name}", "forms", shown(forms), allowed)
-        return Description(list(forms), solver_version(name, plugin), code_of(solver), owner_of(name))
+        for key in replaced(solver):
+            raise InputError.one(f"solver {name}", key, shown(getattr(solver, key)), OTHER_NAME)
+        return Description(list(forms), version_of(name, solver, plugin), code_of(solver), owner_of(name))
 
     return read_all(describe_one, solvers)
+
+
+def version_of(name: str, solver: Solver, plugin: Path | None) -> str:
+    """The version of a solver; of a plug-in that of its files, and of the distribution that it names."""
+    version = solver_version(name, plugin)
+    if plugin is None or plugin.stem != name or not solver.distribution:
+        return version
+    return f"{version} {solver.distribution}=={installed_version(solver.distribution)}"
 
 
 def code_of(solver: Solver) -> str:
@@ -147,16 +162,25 @@ def code_of(solver: Solver) -> str:
     return fingerprint(files, within=["solvers"])
 
 
-NEEDED = ("key", "scene", "status", "time_limit_s", "memory_limit_mib")
+#: What a run reads of its rows: which there are, how searches went, and whether a limit was hit.
+NEEDED = (
+    *("key", "scene", "solver", "form", "tolerance", "repeat"),
+    *("status", "verdict", "time_limit_s", "memory_limit_mib"),
+)
 
 
 def rows_in(directory: Path, console: Console) -> list[Row]:
-    """The rows of DIRECTORY, whose torn last line is removed. Raises InputError."""
-    path = directory / records.MEASUREMENTS
-    if records.remove_torn_line(path):
-        console.print(f"{path}: the last line was cut off, and is measured again.", style="yellow")
-    rows = records.read(path)
-    refuse_wrong_kinds(path, rows, needed=NEEDED)
+    """The rows of DIRECTORY, whose files lose their torn last lines.
+
+    Raises InputError, also if its scenes cannot be read, among which a measured one is recorded.
+    """
+    paths = [directory / name for name in (records.MEASUREMENTS, records.OUTDATED, PROBLEMS)]
+    for path in paths:
+        if records.remove_torn_line(path):
+            console.print(f"{path}: the last line was cut off, and is left out.", style="yellow")
+    rows, problems = records.read(paths[0]), records.read(paths[-1])
+    refuse_wrong_kinds(paths[0], rows, needed=NEEDED)
+    refuse_wrong_kinds(paths[-1], problems, PROBLEM)
     return rows
 
 

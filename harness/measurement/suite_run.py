@@ -249,12 +249,12 @@ def summary(rows: list[Row], console: Console) -> int:
     """Print how many rows there are of each verdict; the exit code, 3 if none could be judged."""
     counts = Counter(row["verdict"] for row in rows)
     words = (f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items())
-    console.print(f"Verdicts: {', '.join(words)}.")
+    console.print(f"Verdicts: {', '.join(words) or 'none'}.")
     if counts["within"] + counts["outside"]:
         return DONE
     why = "no row has an answer"
     if unjudged := [row for row in rows if row["verdict"] == "cannot_be_judged"]:
-        bounds = (row["reference_bound_mm"] for row in unjudged)  # null is an infinite one
+        bounds = (row.get("reference_bound_mm") for row in unjudged)  # null is an infinite one
         least = min(inf if bound is None else bound for bound in bounds)
         proven = "no reference is proven"
         if least < inf:

@@ -23,6 +23,8 @@ from report.document.numbers import upwards
 from .solver_descriptions import Description
 from .worker import FinishedReport, measure, scene_to_measure
 
+AS_READ = "the file that the run has read: it has changed since, or is another on this worker"
+
 
 @dataclass(frozen=True)
 class Task:
@@ -53,18 +55,21 @@ class TaskResult:
 def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into the directory `answers`.
 
-    Raises InputError if the file of the scene is another than that on which they are judged.
+    Raises InputError if the file of the scene is another than that on which they are judged, or that of the
+    plug-in another than that whose version the rows have.
     """
-    source = task.batch[0].source
-    if task.scene_key and read_scene(source).key != task.scene_key:
-        allowed = "the file that the run has read: it has changed since, or is another on this worker"
-        raise InputError.one(source, "scene", "another", allowed)
+    first = task.batch[0]
+    if task.scene_key and read_scene(first.source).key != task.scene_key:
+        raise InputError.one(first.source, "scene", "another", AS_READ)
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[FinishedReport]
     if task.solver.failure:
         reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
-    elif batch[0].form in forms:
+    elif first.form in forms:
         reports = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
+        version, described = reports[0].get("plugin_version"), task.solver.version.partition(" ")[0]
+        if version not in (None, described) and not first.entry.requirements:
+            raise InputError.one(first.suite.plugin, "plugin", "another", AS_READ)
     else:
         reports = [{"status": "unsupported", "message": f"takes {' and '.join(forms)} only"}] * len(batch)
     return TaskResult(reports, time.monotonic() - start)

@@ -20,8 +20,8 @@ from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, cpu_model, resident_mib
 from harness.results.records import Row, replace_arrays
 from harness.results.schema import Report
-from harness.solving.solver_answer import InvalidAnswer, StoredFiles, figures
-from harness.solving.solver_session import SolverSession
+from harness.solving.solver_answer import InvalidAnswer, figures
+from harness.solving.solver_session import SolverSession, copied, given_arrays
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
@@ -29,7 +29,7 @@ from problems.model.scene import Scene
 from problems.reporter import Reporter
 from problems.scene_files import read_scene
 from solvers.base import Answer
-from solvers.registry import make_solver
+from solvers.registry import make_solver, solver_version
 
 from .child_process import Events
 from .environments import interpreter
@@ -47,12 +47,13 @@ SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib", "device")
 class FinishedReport(Report, total=False):
     """A report at its end.
 
-    cannot_save : why the answer's file cannot be written, which ends the run. printed : by the process, with
-    the first of its measurements.
+    cannot_save : why the answer's file cannot be written, which ends the run. With the first measurement of a
+    process: printed, what it printed; plugin_version, that of the plug-in's file when the process read it.
     """
 
     cannot_save: str
     printed: str
+    plugin_version: str
 
 
 class Unsupported(InvalidAnswer):
@@ -115,6 +116,8 @@ class Run(Reporter):
         """Solve the load cases; yields the last event of each row."""
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
+        if plugin and plugin.stem == m.solver:
+            self.events.report(plugin_version=solver_version(m.solver, plugin))
         solver = make_solver(m.solver, m.entry.options, plugin)
         own = {"time_limit_s": OWN_LIMIT * m.time_limit_s, "iteration_limit": m.iteration_limit}
         vars(solver).update(own, prints=True)  # it may be frozen
@@ -129,19 +132,19 @@ class Run(Reporter):
                 self.events.report(model_s=problem.prepared.model_s + time.perf_counter() - start)
             for array in problem.arrays:  # each page, so that no solver's time includes a cold file cache
                 array.ravel(order="K")[:: PAGE // array.itemsize].sum()
-            stored = StoredFiles(problem.arrays)
+        given = given_arrays(problem)
         session = SolverSession(solver, problem, m.tolerance, self)
         batched = m.entry.batched
         if batched is None:
             for case, file in zip(cases, files, strict=True):
                 outcome = self.solved(session, case, file)
-                stored.check()
+                given.check()
                 yield outcome
             return
         for start in range(0, len(cases), batched):
             some = slice(start, start + batched)
             for outcome in self.solved_batch(session, cases[some], files[some]):
-                stored.check()
+                given.check()
                 yield outcome
 
     def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> FinishedReport:
@@ -153,7 +156,7 @@ class Run(Reporter):
         near = session.nearest(load)
         began = time.monotonic()
         self.begin(session)
-        answer = session.next(load, near)
+        answer = session.next(copied(load), near)
         stopped = answer.status != "solved" and time.monotonic() - began >= session.solver.time_limit_s
         x = answer.x
         if "x" not in problem.needs and answer.lam is not None:
@@ -171,7 +174,7 @@ class Run(Reporter):
         """Solve load cases at once and save their answers; each has an equal share of the time."""
         problem = session.problem
         start = time.perf_counter()
-        loads = problem.loads(cases)
+        loads = [copied(load) for load in problem.loads(cases)]
         form_s = time.perf_counter() - start
 
         warm = session.opened

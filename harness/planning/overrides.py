@@ -152,7 +152,10 @@ def _set_options(entries: list[dict[str, Any]], options: Sequence[str], faults: 
     names = {entry["name"] for entry in entries}
     for option in options:
         place, equals, value = option.partition("=")
-        name, _, key = place.strip().partition(".")
+        place = place.strip()
+        named = (name for name in names if place.startswith(f"{name}."))  # that of a plug-in may have dots
+        name = max(named, key=len, default=place.partition(".")[0])
+        key = place[len(name) + 1 :]
         try:
             parsed = tomllib.loads(f"value = {value}")["value"] if equals and key else None
         except tomllib.TOMLDecodeError:

@@ -212,8 +212,8 @@ def _applies(entry: SolverEntry, name: str, source: str) -> bool:
 def with_key(suite: Suite, key: str) -> Suite:
     """The suite with the scene and the solver entries that a row's key names. Raises InputError."""
     scenes = [scene for scene in suite.scenes if key.startswith(f"{read_scene(scene).name} ")]
-    words = key.split()
-    entries = [e for e in suite.solver if {e.name, *e.label.split()} <= set(words)]
+    words = {*key.split()}
+    entries = [e for e in suite.solver if f" {e.name} " in key and {*e.label.split()} <= words]
     if not scenes or not entries:
         raise _unknown(suite.name, key)
     return suite.model_copy(update={"scenes": scenes, "solver": entries})

@@ -22,7 +22,7 @@ from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import reading
 from problems.input.tables import Cells, doubt, is_stray, number
 from problems.model.scene import JointScene
-from report.document.numbers import position, proven_to, upwards
+from report.document.numbers import error_beside, position, proven_to, upwards
 
 LARGEST_MIB = 1024
 #: The vectors of an answer, by their names in a file.
@@ -64,7 +64,7 @@ def judge_file(
     x = answer["x"] if "x" in answer else _recovered(path, problem, lam)
     limit = problem.limit_mm(limit_mm)
     judgement, bound = problem.judged(x, lam, limit), problem.reference.bound_mm
-    console.print(_table(problem, judgement, x))
+    console.print(_table(problem, judgement, x, limit))
     text = f"{judgement.verdict.capitalize()} {limit:.3g} mm."
     if judgement.verdict == "cannot_be_judged":
         how = problem.reference.route
@@ -83,7 +83,7 @@ def _recovered(path: Path, problem: ReferenceProblem, lam: Vector) -> Vector:
     return x
 
 
-def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
+def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector, limit_mm: float) -> Table:
     """The judge's figures, and where the largest error is."""
     error, bound = judgement.displacement_error_mm or 0.0, problem.reference.bound_mm
     assembly = problem.prepared.assembly
@@ -91,7 +91,7 @@ def _table(problem: ReferenceProblem, judgement: Judgement, x: Vector) -> Table:
     nodes, worst = assembly.at_junction(assembly.nodes), int(np.argmax(assembly.at_junction(away)))
     at = f"entry {worst}" if nodes is None else position(nodes[worst], nodes)
     table = Table("figure", "value", title=f"{problem.scene.name}: the answer judged")
-    table.add_row("largest displacement error, mm", f"{error:.3e} at {at}")
+    table.add_row("largest displacement error, mm", f"{error_beside(limit_mm, error)} at {at}")
     table.add_row("proven: every displacement within, mm", upwards(error_bound(error, bound), 4))
     table.add_row("error bound of the reference, mm", upwards(bound))
     table.add_row("contacts open or closed by mistake", str(judgement.contact_mismatch))

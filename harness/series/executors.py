@@ -8,7 +8,6 @@ from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -20,11 +19,11 @@ from harness.measurement.worker import START_S
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.solving.call_lock import in_turn
-from harness.solving.solver_answer import StoredFiles
 from harness.terminal.console import ConsoleReporter
 from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError
+from solvers.registry import solver_version
 
 from .session import BLOCK, Job, Result, SeriesSession
 from .staged import StagedSession, session_of
@@ -100,15 +99,8 @@ def solve_isolated(
 def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
     """Solve the cases of a task in the child process; each result is an event."""
     job, numbers, batched = task
-    refuse_other_matrices(job)
-
-    def report(**event: Any) -> None:
-        events.report(**event)
-        if event["phase"] == "judging":
-            stored.check()
-
-    session = SeriesSession(job, report=report, batched=batched)
-    stored = StoredFiles(session.problem.arrays)
+    refuse_other_files(job)
+    session = SeriesSession(job, report=events.report, batched=batched)
     for some in session.solve(numbers):
         for result in some:
             events.report(row=result.row, gap=result.gap)
@@ -129,11 +121,15 @@ def ended(job: Job, case: int, end: Row) -> Row:
     }
 
 
-def refuse_other_matrices(job: Job) -> None:
-    """Raise InputError if the files of matrices are others than those that the series began with."""
+def refuse_other_files(job: Job) -> None:
+    """Raise InputError if the files of matrices or the plug-in are others than those at the beginning."""
     if job.scene_key and job.scene.key != job.scene_key:
         allowed = "those that the series has read: they have changed since, or are others on this worker"
         raise InputError.one(job.scene.source_of("K"), "matrices", "others", allowed)
+    described = job.plugin_version.partition(" ")[0]  # the rest is the version of a distribution
+    if job.plugin and described not in ("", solver_version(job.solver, job.plugin)):
+        allowed = "that which the series has read: it has changed since, or is another on this worker"
+        raise InputError.one(job.plugin, "plugin", "another", allowed)
 
 
 @in_turn
@@ -143,7 +139,7 @@ def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
     if job.plugin:
         return [result for some in solve_isolated(job, numbers) for result in some]
     if job.key not in _sessions:
-        refuse_other_matrices(job)
+        refuse_other_files(job)
         _sessions.clear()
         _sessions[job.key] = session_of(job)
     session = _sessions[job.key]

@@ -16,7 +16,7 @@ import threadpoolctl
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.results.series_file import Gaps
-from harness.solving.solver_session import SolverSession
+from harness.solving.solver_session import SolverSession, copied, given_arrays
 from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import best_of_candidates, proof_of
@@ -25,11 +25,13 @@ from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.ladders import prefix_of, rung_names
 from problems.load_cases import LoadCases
 from problems.model.fastener_forces import fastener_forces, force_error
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import JointScene, ManufacturedScene, Scene
 from problems.model.springs import Springs
 from problems.reporter import Reporter
+from problems.scene_files import read_scene
 from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver
 
@@ -89,16 +91,32 @@ class SeriesOptions:
 class Job(SeriesOptions):
     """The cases of a series, and how they are solved.
 
-    threads : None: as they are. scene_key : that of the scene at the beginning; "": not told.
+    threads : None: as they are. scene_key, plugin_version : those of the scene and of the plug-in's file at
+    the beginning; "": not told.
     """
 
     scene: Scene
     cases: LoadCases
     form: Form
     plugin: Path | None = None
+    plugin_version: str = ""
     solver_options: dict[str, Any] = field(default_factory=dict)
     key: str = field(default_factory=lambda: uuid4().hex)
     scene_key: str = ""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields for another process, which makes a rung of a ladder anew from its name."""
+        return vars(self) | ({"scene": self.scene.name} if is_rung(self.scene) else {})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        scene = state["scene"]
+        vars(self).update(state | {"scene": read_scene(scene) if isinstance(scene, str) else scene})
+
+
+def is_rung(scene: Scene) -> bool:
+    """Whether matrices in memory are those of a rung of a ladder, which its name makes in any process."""
+    prefix = prefix_of(scene.name) if isinstance(scene, ManufacturedScene) else None
+    return prefix is not None and scene.name in rung_names(prefix)
 
 
 class Result(NamedTuple):
@@ -119,7 +137,8 @@ class Attempt:
 class SeriesSession(Reporter):
     """A job in this process.
 
-    solver : made by the caller, or else by its name. report : called with phase="solve" and `cases` where
+    solver : made by the caller, or else by its name. report : of a plug-in, which is given copies of the load
+    cases, as compiled code may write into them; called with phase="solve" and `cases` where
     the solver begins, so that each case can have its time limit, and with phase="judging" where it ends; a
     case is then judged as soon as it is solved, unless several are solved at once. batched : whether a solver
     that can solve several at once does.
@@ -142,6 +161,7 @@ class SeriesSession(Reporter):
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.solver_options, job.plugin)
         self.row: Row = {}  # of the case being solved
+        self.given = given_arrays(self.problem) if report else None
         self.session = SolverSession(solver, self.problem, job.tolerance, self, KEPT_ANSWERS)
         self.session.open(batched)
 
@@ -180,7 +200,7 @@ class SeriesSession(Reporter):
         self.report(phase="solve", times=len(loads), cases=[case for case, _ in loads])
         start = time.perf_counter()
         try:
-            answers = self.session.solve_batch([load for _, load in loads])
+            answers = self.session.solve_batch([self._own(load) for _, load in loads])
         except Exception:
             return [self._try(case, load) for case, load in loads]
         share = (time.perf_counter() - start) / len(loads)
@@ -192,6 +212,10 @@ class SeriesSession(Reporter):
     def _new_row(self, case: int) -> Row:
         return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
 
+    def _own(self, load: LoadCase) -> LoadCase:
+        """The load case for the solver: a copy for a plug-in."""
+        return load if self.given is None else copied(load)
+
     def _try(self, case: int, load: LoadCase) -> Attempt:
         """Solve one; if the solver raises, its status is `failed`, or `memory_limit` if memory runs out."""
         self.report(phase="solve", cases=[case])
@@ -200,7 +224,7 @@ class SeriesSession(Reporter):
         if near is not None:
             self.row["warm_from"] = near.case
         try:
-            answer = self.session.next(load, near, case)
+            answer = self.session.next(self._own(load), near, case)
         except Exception as error:
             self.session.forget()
             answer = failed(f"{type(error).__name__}: {error}"[:500])
@@ -215,6 +239,8 @@ class SeriesSession(Reporter):
     def assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
         """The proven answers of those that are whole, by the number of the case."""
         self.report(phase="judging")
+        if self.given is not None:
+            self.given.check()
         start = time.perf_counter()
         needs = self.problem.needs
         answered = [one for one in attempts if all(getattr(one.answer, name) is not None for name in needs)]

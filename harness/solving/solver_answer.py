@@ -1,10 +1,11 @@
-"""A solver's answer: whether it is valid, its figures for the row; files that it may not change."""
+"""A solver's answer: whether it is valid, its figures for the row; arrays that it may not change."""
 
 import json
 from collections.abc import Callable, Iterable
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, get_args
+from zlib import crc32
 
 import numpy as np
 
@@ -163,20 +164,34 @@ def figures(answer: Answer) -> Report:
     }
 
 
-class StoredFiles:
-    """The files of memory-mapped arrays, as they are now."""
+class GivenArrays:
+    """The arrays that a solver is given, as they are now: the files of memory-mapped ones, a sum of others.
+
+    Compiled code writes into them whatever their flags say.
+    """
 
     def __init__(self, arrays: Iterable[Matrix]) -> None:
-        self.files = {
-            Path(array.filename) for array in arrays if isinstance(array, np.memmap) and array.filename
-        }
+        self.files, self.others = set[Path](), list[Matrix]()
+        for array in arrays:
+            if isinstance(array, np.memmap) and array.filename:
+                self.files.add(Path(array.filename))
+            else:
+                self.others.append(array)
         self.states = {path: _state(path) for path in self.files}
+        self.sums = [*map(_sum, self.others)]
 
     def check(self) -> None:
-        """Raises InvalidAnswer if a file was written, replaced or deleted since."""
+        """Raises InvalidAnswer if a file was written, replaced or deleted since, or an array changed."""
         changed = sorted({str(path.parent) for path in self.files if _state(path) != self.states[path]})
         if changed:
             raise InvalidAnswer(f"the solver wrote into the cache: delete {', '.join(changed)}")
+        if [*map(_sum, self.others)] != self.sums:
+            raise InvalidAnswer("the solver changed the arrays that it was given: copy, then write")
+
+
+def _sum(array: Matrix) -> int:
+    """A checksum of the content of an array, in any order of its axes."""
+    return crc32(array.ravel(order="K").data)
 
 
 def _state(path: Path) -> tuple[int, ...]:

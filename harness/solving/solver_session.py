@@ -17,12 +17,12 @@ from problems.errors import InputError
 from problems.forms import Form, default_form
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Problem, in_form
+from problems.forms.problem import Problem, in_form, read_only
 from problems.forms.solver_units import Units
 from problems.reporter import SILENT, Reporter
 from solvers.base import Answer, Batch, Solver, WarmStart
 
-from .solver_answer import InvalidAnswer, checked
+from .solver_answer import GivenArrays, InvalidAnswer, checked
 
 NO_ANSWER = "gave no answer; try another solver or form"
 NO_CONTACT = "no contact closes"
@@ -30,6 +30,9 @@ NO_CONTACT = "no contact closes"
 DENSE = ("newton", "ipm-fast", "ipm", "gi")
 SPARSE = ("newton", "mprgp")
 TOLERANCE_MM = 1e-11  # of these methods
+#: Attributes of solvers.base.Solver that a run sets.
+SET_BY_RUNS = ("time_limit_s", "iteration_limit", "prints")
+OTHER_NAME = "Choose another name: a run replaces it. self.most(LIMIT) has its limit on iterations and yours"
 
 
 @dataclass(frozen=True)
@@ -166,8 +169,39 @@ def _in_own_units(answer: Answer, units: Units) -> Answer:
     """The answer with λ and x in the problem's units; what is no Answer stays, to be refused."""
     if units.unchanged or not isinstance(answer, Answer):
         return answer
-    lam, x = units.answer(answer.lam, answer.x)
+    lam, x = units.answer(_array(answer.lam), _array(answer.x))
     return replace(answer, lam=lam, x=x)
+
+
+def _array(value: Any) -> Any:
+    """An array of NumPy of what can be one, as of JAX or PyTorch; what cannot stays, to be refused, and so
+    does a masked array.
+    """
+    if isinstance(value, np.ndarray):
+        return value
+    try:
+        array = np.asarray(value)
+    except Exception:  # of a class of the user's
+        return value
+    return array if array.dtype.kind in "fiu" else value
+
+
+def replaced(solver: Solver) -> list[str]:
+    """The attributes of a solver to which it has given values of its own, and a run gives others."""
+    return [name for name in SET_BY_RUNS if getattr(solver, name) != getattr(Solver, name)]
+
+
+def copied(load: LoadCase) -> LoadCase:
+    """A read-only copy for a solver: what compiled code writes into it changes no other load case."""
+    arrays = {name: value.copy() for name, value in vars(load).items() if isinstance(value, np.ndarray)}
+    return read_only(replace(load, **arrays))
+
+
+def given_arrays(problem: Problem) -> GivenArrays:
+    """The arrays of a problem that a solver is given, made read-only."""
+    protect(problem)
+    A = problem.assembly.A
+    return GivenArrays([*problem.arrays, A.data, A.indices, A.indptr])
 
 
 def protect(problem: Problem) -> None:

@@ -26,8 +26,8 @@ from harness.terminal.console import STYLES
 from problems.errors import InputError
 from problems.forms import form_family
 from problems.input.bounded_types import Positive
-from report.document.escape import markdown, quoted
-from report.document.numbers import counted, out_of, proven_to
+from report.document.escape import markdown, quoted, short
+from report.document.numbers import counted, error_beside, out_of, proven_to
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
@@ -48,6 +48,8 @@ GATED = create_model(
 )
 HEADINGS = ["measurement", "error mm", "limit mm", "verdict", "why"]
 UNREADABLE = "is missing, damaged or not finite"
+#: On the page of a CI job, which GitHub drops whole if it is larger than 1 MiB.
+MOST_LINES, LONGEST_CELL = 200, 200
 
 #: The files of a run that no output may replace.
 MEASURED = ("*.jsonl", "*.toml", "machine*.json", "answers/*")
@@ -228,9 +230,9 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
         case "no_answer":
             why = f"{row['answer']} {UNREADABLE}"
         case "cannot_be_judged":
-            why = f"the reference is {proven_to(bound)}; {REFERENCE_SHARE * limit:.0e} mm is needed"
+            why = f"the reference is {proven_to(bound)}; {REFERENCE_SHARE * limit:.3g} mm is needed"
         case "outside":
-            why = f"{judgement.displacement_error_mm:.3e} mm from the reference"
+            why = f"{error_beside(limit, judgement.displacement_error_mm or 0.0)} mm from the reference"
         case _:
             why = ""
     return Finding(row["key"], judgement, limit, why)
@@ -246,15 +248,19 @@ def table(findings: list[Finding]) -> Table:
 
 
 def _cells(finding: Finding) -> tuple[str, ...]:
-    error = finding.judgement.displacement_error_mm
-    shown = "–" if error is None else f"{error:.1e}"
-    return finding.key, shown, f"{finding.limit_mm:.0e}", finding.judgement.verdict, finding.why
+    error, limit = finding.judgement.displacement_error_mm, finding.limit_mm
+    shown = "–" if error is None else error_beside(limit, error)
+    return finding.key, shown, f"{limit:.3g}", finding.judgement.verdict, finding.why
 
 
 def append_summary(path: Path, outcome: GateOutcome) -> None:
-    """Append the outcome to the Markdown of a CI job's page: sentences, then a table, what failed first."""
+    """Append the outcome to the Markdown of a CI job's page: sentences, then a table of at most MOST_LINES
+    measurements, what failed first.
+    """
     findings = sorted(outcome.findings, key=lambda finding: finding.passed)
-    cells = quoted([[*_cells(finding)] for finding in findings])
-    told = pd.DataFrame(cells, columns=HEADINGS).to_markdown(index=False, disable_numparse=True)
+    cells = [[short(cell, LONGEST_CELL) for cell in _cells(one)] for one in findings[:MOST_LINES]]
+    told = pd.DataFrame(quoted(cells), columns=HEADINGS).to_markdown(index=False, disable_numparse=True)
+    more = len(findings) - MOST_LINES
+    told += f"\n\n… and {more} more" if more > 0 else ""
     with path.open("a", encoding="utf-8") as page:
         page.write(markdown(f"## The accuracy gate\n\n{' '.join(outcome.sentences)}\n\n{told}\n\n"))

@@ -68,6 +68,11 @@ def digits_beside(limit: float, value: float, least: int = 3) -> int:
     return next(k for k in range(least, 18) if (float(f"{value:.{k - 1}e}") > limit) == (value > limit))
 
 
+def error_beside(limit: float, error: float) -> str:
+    """1.00004e-07 beside 1e-07: four digits, or as many as show an error on its side of a limit."""
+    return f"{error:.{max(digits_beside(limit, error), 4) - 1}e}"
+
+
 def beside(limit: float) -> Callable[[object], str]:
     """Shows values with the digits that show them on their sides of a limit, and infinite ones as inf."""
 

@@ -47,7 +47,7 @@ def frame(records: list[dict[str, Any]], by: Sequence[str] = ()) -> pd.DataFrame
     rows["reference_bound_mm"] = rows["reference_bound_mm"].mask(unproven, np.inf)
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]
     rows = rows.drop_duplicates([*CELL, "repeat", "case", *by], keep="last")
-    line = [name for name in (*CELL, *by) if name != "tolerance"]
+    line = [name for name in (*CELL, "case", *by) if name not in ("machine", "tolerance")]
     return rows[chosen(rows, line)].reset_index(drop=True)
 
 

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from harness.conformance.known_problems import known_problems
-from harness.solving.solver_answer import LARGEST_DETAILS, InvalidAnswer, checked, examined, figures
+from harness.solving.solver_answer import (
+    LARGEST_DETAILS,
+    GivenArrays,
+    InvalidAnswer,
+    checked,
+    examined,
+    figures,
+)
 from harness.solving.solver_session import no_answer
 from problems.forms.problem import Problem, in_form
 from solvers.base import Answer, Status
@@ -110,3 +117,12 @@ def test_the_cause_in_library_words(status: Status, details: dict[str, str], cau
     answer = Answer(status, None, details=details)
     assert figures(answer)["message"] == cause
     assert str(no_answer("osqp", answer)).count(": ".join(filter(None, (status, cause)))) == 1
+
+
+def test_an_array_that_compiled_code_has_changed_is_told() -> None:
+    array = np.ones((3, 2), order="F")
+    given = GivenArrays([array, np.zeros(0)])
+    given.check()
+    array[1, 1] = 2.0
+    with pytest.raises(InvalidAnswer, match="the solver changed the arrays that it was given"):
+        given.check()

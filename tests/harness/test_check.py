@@ -181,6 +181,16 @@ def test_a_step_that_raises_is_named_with_its_line() -> None:
     assert "test_check.py, line" in words
 
 
+def test_an_error_within_a_library_is_named_with_the_line_that_calls_it() -> None:
+    class Raises(Sound):
+        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
+            return np.linalg.cholesky(-np.eye(2))
+
+    words = words_of(Raises, ("dual",))
+    assert "setup: raised LinAlgError" in words
+    assert "test_check.py, line" in words
+
+
 def test_wrong_forms_and_a_failing_constructor() -> None:
     class Wrong(Sound):
         forms = ("both",)  # type: ignore[assignment]
@@ -191,6 +201,15 @@ def test_wrong_forms_and_a_failing_constructor() -> None:
 
     assert "forms is ('both',)" in words_of(Wrong)
     assert "constructor: raised KeyError" in words_of(Fails)
+
+
+def test_a_limit_of_its_own_that_a_run_replaces() -> None:
+    class Limited(Sound):
+        def __init__(self) -> None:
+            super().__init__()
+            self.iteration_limit = 500
+
+    assert "iteration_limit is 500. Choose another name" in words_of(Limited, ("dual",))
 
 
 def test_load_cases_at_once_in_another_order() -> None:

@@ -9,8 +9,10 @@ from commands import harness
 from synthetic_results import no_answer, row, write_rows
 from typer.testing import Result
 
+from harness.results.counted_rows import counting
 from harness.verification.findings import read_baseline
 from problems.errors import InputError
+from report.results.reader import read
 
 
 def compare(*words: object) -> Result:
@@ -185,6 +187,24 @@ def test_the_answer_that_a_search_keeps_is_compared(
     done = compare(old, write_rows(tmp_path / "new", searched(kept, **figures)))
     assert said in done.stdout
     assert done.exit_code == (0 if "alike" in said else 1)
+
+
+@pytest.mark.parametrize(
+    ("tried", "kept"),
+    [
+        ({"a": {1e-5: "outside"}, "b": {1e-6: "within"}}, [1e-6]),
+        ({"a": {1e-5: "outside", 1e-6: "within"}, "b": {1e-6: "outside", 1e-7: "within"}}, [1e-6, 1e-7]),
+    ],
+)
+def test_workers_on_two_machines_share_a_search_and_merged_runs_do_not(
+    tried: dict[str, dict[float, str]], kept: list[float], tmp_path: Path
+) -> None:
+    """The gate, which counts rows, and the report keep the same answers."""
+    told = [(name, *pair) for name, verdicts in tried.items() for pair in verdicts.items()]
+    figures = ({"machine": name, "tolerance": tol, "verdict": verdict} for name, tol, verdict in told)
+    rows = [row(searched=True, **each) for each in figures]
+    assert [each["tolerance"] for each in counting(rows)] == kept
+    assert read(write_rows(tmp_path, rows)).rows["tolerance"].tolist() == kept
 
 
 def test_runs_that_a_trace_stopped_are_not_compared(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pandas as pd
 import pytest
 from commands import harness
-from suite_runs import changed, moved, rows_of
+from suite_runs import changed, moved, rows_of, said_by
 from synthetic_results import row
 from typer.testing import Result
 
@@ -17,6 +17,7 @@ from harness.results import records
 from harness.results.comparison import Incomparable, Side, measurement
 from harness.results.records import Row
 from harness.verification.findings import Baseline, Finding, read_baseline, write_junit
+from harness.verification.gate import GateOutcome, append_summary, show
 from harness.verification.judge import Judgement
 from harness.verification.slowdown import slowdowns
 from problems.errors import InputError
@@ -299,3 +300,18 @@ def test_the_page_of_a_job_has_the_outcome(
     assert "outside" in first
     assert "within" in second
     assert rows_of(copy)[0]["key"] in second
+
+
+def test_the_page_of_a_job_is_no_longer_than_github_takes(tmp_path: Path) -> None:
+    """It drops a page of more than 1 MiB; a solver may say much of each failure."""
+    failed = Finding("k" * 300, Judgement("no_answer"), 1e-7, "*" * 60_000)
+    append_summary(tmp_path / "page.md", GateOutcome([failed] * 5000, 1, ("Accuracy lost.",)))
+    page = (tmp_path / "page.md").read_text("utf-8")
+    assert len(page.encode()) < 2**20
+    assert page.rstrip().endswith("… and 4800 more")
+
+
+def test_an_error_has_the_digits_that_show_it_on_its_side_of_the_limit() -> None:
+    lost = Finding("tiny exact", Judgement("outside", displacement_error_mm=1.000004e-7), 1e-7)
+    _, text = said_by(show, GateOutcome([lost], 1, ("Accuracy lost.",)))
+    assert "1.000004e-07" in text

@@ -217,6 +217,17 @@ def test_a_scene_without_files_is_not_made_again_to_be_compared(
     assert run_task(task, folder).reports[0]["status"] == "unsupported"
 
 
+def test_another_plug_in_than_the_one_described_is_refused(folder: Path) -> None:
+    """It was edited meanwhile, or is older on a worker: its row would have the version of the other."""
+    entry = SolverEntry(name="exact")
+    suite = Suite(name="s", scenes=["tiny"], plugin=str(folder / "exact.py"), solver=[entry])
+    asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
+    m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
+    task = Task([m], Description(["dual"], "sha256:of another", "code"))
+    with pytest.raises(InputError, match=r"exact\.py: plugin = 'another': the file that the run has read"):
+        run_task(task, folder)
+
+
 def test_a_full_disk_is_not_the_solvers_fault(folder: Path) -> None:
     assert (
         str(folder / "missing" / "answer.npz") in outcome(folder, None, "missing/answer.npz")["cannot_save"]

@@ -110,6 +110,22 @@ def test_a_merged_run_is_merged_with_another(
     assert made == [(FAST, 2.0), (SLOW, 1446.0), ("A third", 3.0)]
 
 
+def test_a_merge_that_is_interrupted_says_what_to_do_with_its_rows(
+    both: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its report takes much longer than all the rest."""
+
+    def interrupted(out: Path) -> Path:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("harness.commands.merged_runs.report", interrupted)
+    done = harness("merge", *both, "--out", tmp_path / "out")
+    assert done.exit_code == 130
+    assert (tmp_path / "out" / records.MEASUREMENTS).exists()
+    assert "nothing was written" not in done.output
+    assert "`report` takes the merged rows" in done.output
+
+
 @pytest.mark.parametrize("name", ["machine.json", "problems.jsonl", "suite.toml"])
 @pytest.mark.parametrize("content", [b"\xff{", b"[1]\n"])
 def test_a_damaged_file_is_named_before_anything_is_written(

@@ -108,6 +108,42 @@ def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
     assert json.loads(again[3])["key"] == json.loads(lines[3])["key"]
 
 
+@pytest.mark.parametrize("name", ["problems.jsonl", records.OUTDATED])
+def test_a_torn_line_of_another_file_is_left_out_too(copy: Path, folder: Path, name: str) -> None:
+    """`report` refuses it, and says that `run` into the same directory removes it."""
+    before = records.read(copy / name)
+    with (copy / name).open("ab") as file:
+        file.write(b'{"torn')
+    code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
+    assert code == 0
+    assert f"{name}: the last line was cut off" in text.replace("\n", "")
+    assert records.read(copy / name) == before
+
+
+@pytest.mark.parametrize("name", ["verdict", "tolerance", "repeat"])
+def test_a_row_that_lacks_what_a_run_reads_is_named(copy: Path, folder: Path, name: str) -> None:
+    rows = rows_of(copy)
+    del rows[1][name]
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    done = harness("run", folder / "small.toml", "--out", copy)
+    assert done.exit_code == 2
+    assert f"line 2: {name}" in done.stderr
+
+
+def test_scenes_that_cannot_be_read_end_a_run_before_it_measures(
+    copy: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A measured scene is recorded among them before its rows are."""
+    measured = list[str]()
+    monkeypatch.setattr("harness.measurement.task.measure", lambda batch, _: measured.append(batch[0].key))
+    records.rewrite(copy / records.MEASUREMENTS, rows_of(copy)[:2])
+    (copy / "problems.jsonl").write_text('{"n": 3}\n')
+    done = harness("run", folder / "small.toml", "--out", copy)
+    assert done.exit_code == 2
+    assert "problems.jsonl: line 1: scene" in done.stderr
+    assert measured == []
+
+
 def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path) -> None:
     rows, names = rows_of(copy), ("scene_key", "solver_version", "solver_code")
     answered = [row for row in rows if row["answer"]]

@@ -323,6 +323,15 @@ def test_a_version_is_part_of_what_a_row_is_of(tmp_path: Path) -> None:
     assert entry.label == "plain 0.6.2 numpy==2.1.0"
 
 
+def test_the_name_of_a_plug_in_may_have_blanks_and_dots(tmp_path: Path) -> None:
+    name = "my solver 1.2"
+    asked = Overrides(solvers=(name,), options=(f"{name}.k=3",), plugin=tmp_path / f"{name}.py")
+    suite = overridden(read_suite(str(tiny_joint.write_suite(tmp_path))), asked)
+    (entry,) = with_key(suite, expand(suite)[0].key).solver
+    assert entry.name == name
+    assert entry.options == {"k": 3}
+
+
 @pytest.mark.parametrize("requirement", ["piqp>=0.6", "piqp==", "==1.0", "--index-url=x", "piqp==0.6.*"])
 def test_a_version_is_exact(tmp_path: Path, requirement: str) -> None:
     with pytest.raises(InputError, match=r"NAME==VERSION, as piqp==0\.6\.2"):

@@ -1,7 +1,9 @@
 """The change of units: exact, undone on the answer, and the same answer in any units from every solver."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,6 +129,38 @@ class Seen(Solver):
     def solve(self, ready: Problem, load: LoadCase, tolerance: float) -> Answer:
         self.problem, self.load, self.tolerance = ready, load, tolerance
         return Answer("failed", None)
+
+
+class Foreign:
+    """An array of another library, as of JAX or PyTorch."""
+
+    def __init__(self, values: Vector) -> None:
+        self.values = values
+
+    def __array__(self, dtype: object = None, copy: object = None) -> Vector:
+        return self.values.copy()
+
+
+class Ones(Solver):
+    forms = ("sparse",)
+
+    def __init__(self, kind: Callable[[Vector], Any]) -> None:
+        self.kind = kind
+
+    def solve(self, ready: Problem, load: LoadCase, tolerance: float) -> Answer:
+        lam, x = np.ones(ready.assembly.m), np.ones(ready.assembly.n)
+        return Answer("solved", self.kind(lam), self.kind(x))
+
+
+@pytest.mark.parametrize("kind", [list, Foreign])
+def test_an_answer_in_arrays_of_any_kind_has_the_units_of_the_problem(kind: Callable[[Vector], Any]) -> None:
+    problem, load = opened("three-part-stack")
+    sessions = [SolverSession(Ones(made), problem, 1e-9) for made in (np.asarray, kind)]
+    for session in sessions:
+        session.open()
+    expected, answer = (session.next(load, None) for session in sessions)
+    for name in ("lam", "x"):
+        np.testing.assert_array_equal(getattr(answer, name), getattr(expected, name))
 
 
 @pytest.mark.parametrize("form", ["primal", "dual", "sparse"])

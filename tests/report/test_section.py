@@ -15,6 +15,7 @@ from report.document.numbers import (
     beside,
     coordinate,
     digits_beside,
+    error_beside,
     extent,
     position,
     proven_to,
@@ -210,6 +211,8 @@ def test_a_value_is_shown_on_its_side_of_a_limit() -> None:
     said = [beside(0.05)(value) for value in (0.0512, 0.05004, 0.05, 0.04999)]
     assert said == ["0.0512", "0.05004", "0.0500", "0.0500"]
     assert [beside(0.05)(value) for value in (np.inf, None, np.nan)] == ["inf", "–", "–"]
+    errors = [error_beside(1e-7, value) for value in (2e-7, 1.000004e-7, 1e-7, 3.21e-12)]
+    assert errors == ["2.000e-07", "1.000004e-07", "1.000e-07", "3.210e-12"]
 
 
 def test_more_digits_are_on_the_side_of_a_limit_too() -> None:

@@ -48,3 +48,12 @@ def test_the_script_ends_as_the_gate_does(run: int, gate: int, code: int, tmp_pa
     assert calls[1] == "1 -m harness run mine.toml --plugin ci/exact.py --solver exact --out out --threads 1"
     judged = "1 -m harness gate out --json out/gate.json --junit out/gate.xml --baseline before --margin 10"
     assert calls[2:] == ([judged] if run in (0, 1, 3) else [])
+
+
+def test_the_name_of_the_artifact_has_no_slash(tmp_path: Path) -> None:
+    """GitHub takes none, but the directory may lie in another."""
+    (command,) = re.findall(r"run: (.* >> \"\$GITHUB_OUTPUT\")$", ACTION, re.MULTILINE)
+    said = tmp_path / "output"
+    names = {"OUT": "results/my gate_1.0", "GITHUB_OUTPUT": str(said)}
+    subprocess.run(["bash", "-c", command], env=os.environ | names, check=True)
+    assert said.read_text() == "name=results-my-gate_1.0\n"

@@ -4,6 +4,7 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tiny_joint
 from commands import harness, wrong_usage
@@ -15,6 +16,7 @@ import harness.measurement.solver_descriptions as describing
 from harness import InputError
 from harness.measurement.solver_descriptions import describe, described
 from harness.planning.suite import read_suite
+from solvers.registry import solver_version
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
@@ -107,6 +109,32 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
     with pytest.raises(InputError, match="solver mine: forms"):
         described([("mine", {})], tmp_path / "mine.py", "test")
+
+
+def test_a_plug_in_has_the_version_of_the_distribution_that_it_names(tmp_path: Path) -> None:
+    """Behind that of its own files: an upgrade outdates its rows."""
+    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + '\n    distribution = "numpy"\n')
+    (found,) = described([("mine", {})], tmp_path / "mine.py", "test")
+    assert found.version == f"{solver_version('mine', tmp_path / 'mine.py')} numpy=={np.__version__}"
+
+
+def test_an_option_with_the_name_of_what_a_run_sets_is_bad_input(tmp_path: Path) -> None:
+    """The run would replace its value without a word."""
+    printing = "\n    def __init__(self, prints=True):\n        self.prints = prints\n"
+    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + printing)
+    with pytest.raises(InputError, match="solver mine: prints = 'True': Choose another name"):
+        described([("mine", {})], tmp_path / "mine.py", "test")
+
+
+@pytest.mark.parametrize("name", ["newton", "piqp"])
+def test_a_plug_in_with_the_name_of_a_solver_of_the_package_is_bad_input(tmp_path: Path, name: str) -> None:
+    """Before anything is measured, as that solver or not at all."""
+    plugin = tmp_path / f"{name}.py"
+    plugin.write_text(tiny_joint.EXACT)
+    suite, out = tiny_joint.write_suite(tmp_path), tmp_path / "out"
+    done = harness("run", suite, "--plugin", plugin, "--solver", name, "--out", out)
+    assert (done.exit_code, out.exists()) == (2, False)
+    assert "is taken by a solver of the package: rename the file" in done.stderr
 
 
 @pytest.mark.parametrize("what", ["check", "run"])

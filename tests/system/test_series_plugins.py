@@ -4,6 +4,7 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psutil
 import pytest
 from commands import harness
@@ -11,7 +12,12 @@ from plugin_commands import LESS_MEMORY, MORE_MEMORY, interrupt, write
 from strip_scene import write_strip
 from suite_runs import all_end
 
+from harness import GapCases, InputError, SeriesOptions, own_matrices, run_series
 from harness.results import series_file
+from harness.series.executors import solve_isolated
+from harness.series.session import Job
+from problems.load_cases.random_gaps import random_gaps
+from problems.scene_files import read_scene
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
@@ -79,6 +85,42 @@ def test_on_workers_too(tmp_path: Path, cluster: Any) -> None:
     assert "ended with exit code 7" in done.output
     assert "2 no answer" in done.output
     assert not any(psutil.Process(nanny.pid).children() for nanny in cluster.workers.values())
+
+
+def test_a_rung_of_a_ladder_is_solved(tmp_path: Path) -> None:
+    """The process of the plug-in makes it from its name."""
+    np.save(tmp_path / "gaps.npy", np.array([[0.0], [1e-3]]))
+    words = ["series", "hard/parts/two-nodes", "--gaps", tmp_path / "gaps.npy", "--out", tmp_path / "out"]
+    done = harness(*words, "--plugin", write(tmp_path), "--solver", "mine", "--check", 0, "--threads", 1)
+    assert done.exit_code == 0, done.output
+    assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within"]
+
+
+def test_matrices_in_memory_are_not_sent_to_a_plug_in(tmp_path: Path) -> None:
+    scene = own_matrices([[100.0]], [[1.0]], [50.0], [0.2])
+    np.save(tmp_path / "gaps.npy", np.array([[0.1]]))
+    options = SeriesOptions(solver="mine", plugin=write(tmp_path))
+    cases = GapCases(gaps=tmp_path / "gaps.npy")
+    with pytest.raises(InputError, match="a scene that another process can read"):
+        run_series(scene, tmp_path / "out", cases, options)
+
+
+def test_another_plug_in_than_the_one_described_is_refused(tmp_path: Path) -> None:
+    """It was edited meanwhile, or is older on a worker: a series is of one solver."""
+    scene = read_scene(str(write_strip(tmp_path)))
+    plugin: Any = {"solver": "mine", "plugin": write(tmp_path), "plugin_version": "sha256:of another"}
+    job = Job(**plugin, scene=scene, cases=random_gaps(scene, 2, 0), form="dual", check=0, threads=1)
+    with pytest.raises(InputError, match=r"mine\.py: plugin = 'another': that which the series has read"):
+        list(solve_isolated(job, [0, 1]))
+
+
+def test_answers_are_proven_on_the_loads_as_they_were(tmp_path: Path) -> None:
+    """Compiled code writes into arrays whatever their flags say: the bound was of the changed load case."""
+    write_by_force = "load.g.flags.writeable = True; load.g += 1.0"
+    done = harness(*series(tmp_path, in_solve=write_by_force))
+    assert done.exit_code == 0, done.output
+    verdicts = [row["verdict"] for row in series_file.rows(tmp_path / "out")]
+    assert verdicts == ["within"] * 5
 
 
 def test_a_signal_ends_what_sleeps(tmp_path: Path) -> None:
