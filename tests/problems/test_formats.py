@@ -56,6 +56,15 @@ def test_a_round_trip_is_bit_for_bit(form: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(read_back["nodes"], wanted["nodes"])
 
 
+def test_an_almost_symmetric_A_comes_back_from_op4_as_it_was(tmp_path: Path) -> None:
+    """pyyeti calls a matrix symmetric whose entries differ by 1e-8, of which one triangle would count."""
+    A = np.array([[1.0, 0.0], [1e-9, 1.0]])
+    data = {"K": sp.csr_array(np.eye(2)), "A": sp.csc_array(A), "f": np.ones(2), "g": np.ones(2)}
+    formats.FORMATS["op4"].write(tmp_path / "p.op4", data)
+    found, _ = formats.read_labelled(tmp_path / "p.op4")["A"]
+    np.testing.assert_array_equal(found, A)
+
+
 def test_dmig_keeps_ten_digits(tmp_path: Path) -> None:
     """pyyeti sets how numpy prints when it is imported, and tables would lose their last digits."""
     wanted, read_back = there_and_back("dmig", tmp_path)

@@ -186,6 +186,17 @@ def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path
     assert not (tmp_path / "mine.npz").exists()
 
 
+def test_a_large_sparse_K_is_sparse_in_an_op4_file(tmp_path: Path) -> None:
+    K = sp.diags_array([np.full(N, 4.0), -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], format="csr")
+    data = {"K": K, "A": sp.eye_array(N, M, format="csc"), "f": np.ones(N), "g": np.ones(M)}
+    formats.FORMATS["op4"].write(tmp_path / "p.op4", data)
+    found = formats.read_labelled(tmp_path / "p.op4")
+    for name in "KA":
+        matrix, _ = found[name]
+        assert sp.issparse(matrix)
+        assert abs(sp.csr_array(matrix) - data[name]).max() == 0
+
+
 def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:
     op4 = pyyeti(tmp_path).op4
     K = band_matrix(np.random.default_rng(2), 50, 2)
