@@ -71,9 +71,8 @@ def own_matrices(
     >>> print(f"{answer.x[0]:.3f} mm, {answer.lam[0]:.3f} N")
     0.200 mm, 30.000 N
     """
-    vectors = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
-    arrays = {name: M if sp.issparse(M) else np.asanyarray(M) for name, M in (("K", K), ("A", A))}
-    arrays |= {name: np.array(value, subok=True) for name, value in vectors.items()}
+    given = {"K": K, "A": A, "f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
+    arrays = {name: _array(title, name, value) for name, value in given.items()}
     sparse = sp.issparse(K) and K.shape[0] > SMALL
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
     return ManufacturedScene.of(title, ManufacturedProblem(assembly, load), title)
@@ -287,6 +286,14 @@ def _results(session: SeriesSession, blocks: Iterable[LoadCases]) -> Iterator[Re
         results = session.solve(range(cases.first, cases.first + cases.count))
         while some := step(results, None):
             yield from some
+
+
+def _array(where: str, name: str, value: Any) -> Any:
+    """An array, or a sparse matrix as it is. Raises InputError for rows of several lengths."""
+    try:
+        return value if sp.issparse(value) else np.asanyarray(value)
+    except ValueError as error:
+        raise InputError.one(where, name, value, "rows of one length") from error
 
 
 def _numbers(where: str, name: str, value: ArrayLike) -> Matrix:
