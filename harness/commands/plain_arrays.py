@@ -11,7 +11,7 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from harness.planning.form_choice import chosen_form
+from harness.planning.form_choice import chosen_form, form_of_answer
 from harness.scene.solution import Source, load_scene, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.call_lock import in_turn
@@ -19,14 +19,14 @@ from harness.solving.solver_session import forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import open_problem
 from problems.errors import InputError
-from problems.forms import FORMS, Form
+from problems.forms import Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import dual_alone
 from problems.forms.problem import in_form
 from problems.input.matrix_entries import SYMMETRY, contradictions
 from problems.input.user_matrices import SMALL, checked
 from problems.load_cases import Listed, LoadCases
-from problems.model.scene import ManufacturedProblem, ManufacturedScene, Scene
+from problems.model.scene import JointScene, ManufacturedProblem, ManufacturedScene, Scene
 from solvers.base import Answer, Solver
 
 NOT_FINITE = "NaN or infinity"
@@ -83,7 +83,7 @@ def judge(
     x: ArrayLike,
     lam: ArrayLike | None = None,
     limit_mm: float = LIMIT_MM,
-    form: Form = "primal",
+    form: Form | None = None,
 ) -> Judgement:
     """Judge an answer that came from elsewhere, against the certified reference of the scene.
 
@@ -98,7 +98,8 @@ def judge(
     limit_mm : float, optional
         Limit on max|x − x*|, mm.
     form : str, optional
-        "primal", "dual" or "sparse"; in the sparse form nothing dense is made.
+        "primal", "dual" or "sparse"; in the sparse form nothing dense is made. By default primal; of own
+        matrices, whose x is the same in each, the cheaper one.
 
     Returns
     -------
@@ -118,7 +119,7 @@ def judge(
     """
     _refuse_limit("judge", limit_mm)
     scene = load_scene(scene)
-    problem = open_problem(scene, chosen_form(scene, FORMS, form).form)
+    problem = open_problem(scene, form_of_answer(scene, form))
     n, m = problem.prepared.assembly.n, problem.prepared.assembly.m
     x = _vector("judge", "x", x, n)
     forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)
@@ -177,7 +178,7 @@ def solve_dual(
         sla.cholesky(Q)
     except np.linalg.LinAlgError as error:
         raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
-    name, chosen = solver_named(solver, options)
+    name, chosen = solver_named(solver, options, tolerance)
     form = form_of(name, chosen.forms, "dual")
     return forces_of(name, chosen, in_form(dual_alone(Q), form), DualLoadCase(0 * p, -p, p), tolerance)
 
@@ -207,7 +208,7 @@ def solve_series(
     options : dict, optional
         Options of a solver by name.
     form : str, optional
-        "primal", "dual" or "sparse"; by default the usual one of the solver.
+        "primal", "dual" or "sparse"; by default the usual one of the solver, of own matrices the cheaper one.
     tolerance : float, optional
         Passed to the solver.
     limit_mm : float, optional
@@ -236,8 +237,9 @@ def solve_series(
     """
     _refuse_limit("solve_series", limit_mm)
     scene = load_scene(scene)
-    name, chosen = solver_named(solver, options)
-    taken = form_of(name, chosen.forms, form)
+    name, chosen = solver_named(solver, options, tolerance)
+    of_own = form is None and not isinstance(scene, JointScene)
+    taken = chosen_form(scene, chosen.forms, None).form if of_own else form_of(name, chosen.forms, form)
     first = cases if isinstance(cases, LoadCases) else Listed(())
     job = Job(
         solver=name,

@@ -191,7 +191,7 @@ def solve(
     0.668 mm, within
     """
     scene, clock = load_scene(scene), _Clock(reporter)
-    named = None if solver is None else solver_named(solver, options)
+    named = None if solver is None else solver_named(solver, options, tolerance)
     with clock.step("choosing the form"):
         forms = FORMS if named is None else named[1].forms
         asked = form_of(named[0], forms, form) if form and named else form
@@ -317,8 +317,12 @@ def _solved(
     )
 
 
-def solver_named(solver: str | Solver, options: Mapping[str, Any] | None) -> tuple[str, Solver]:
-    """The solver and its name."""
+def solver_named(
+    solver: str | Solver, options: Mapping[str, Any] | None, tolerance: float
+) -> tuple[str, Solver]:
+    """The solver and its name. Raises InputError, also for a tolerance without meaning."""
+    if not 0 < tolerance < inf:
+        raise InputError.one("solver", "tolerance", tolerance, "must be positive and finite")
     if isinstance(solver, str):
         from solvers.registry import make_solver  # slow to import: not without a solver
 

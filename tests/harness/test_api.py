@@ -227,6 +227,9 @@ def test_limits_that_are_no_numbers_are_refused_from_python() -> None:
     scene = own_matrices(*matrices()[2])
     for refused in (
         lambda: solve(scene, limit_s=np.nan),
+        lambda: solve(scene, "gi", tolerance=np.nan),
+        lambda: solve_dual([[1.0]], [1.0], tolerance=np.nan),
+        lambda: solve_series(scene, [], tolerance=np.nan),
         lambda: judge(scene, np.zeros(14), limit_mm=np.nan),
         lambda: solve_series(scene, [], limit_mm=np.nan),
     ):

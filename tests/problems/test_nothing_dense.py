@@ -16,7 +16,7 @@ from scipy.sparse.linalg import spsolve
 from small_joints import two_parts
 from sparse_matrices import band_matrix, renumbered
 
-from harness import load_scene, own_matrices, solve
+from harness import LoadCase, judge, load_scene, own_matrices, solve, solve_series
 from harness.planning import form_choice
 from problems import formats, storage
 from problems.build import load_case, prepared
@@ -173,6 +173,17 @@ def test_tens_of_thousands_of_separate_unknowns_are_solved() -> None:
     assert found.judgement.verdict == "within"
     exact = np.where(np.arange(n) < m, np.minimum(f, 1), f)
     assert abs(found.x - exact).max() <= found.error_bound_mm <= 1e-12
+
+
+def test_a_series_and_a_judgement_of_an_own_sparse_K_make_nothing_dense() -> None:
+    K = sp.diags_array([np.full(N, 4.0), -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], format="csc")
+    A, f, g = sp.eye_array(N, M, format="csc"), np.linspace(9.0, 0.0, N), np.ones(M)
+    scene = own_matrices(K, A, f, g)
+    x = solve(scene).x
+    (result,) = solve_series(scene, [LoadCase(f, g)])
+    assert result.row["verdict"] == "within"
+    np.testing.assert_allclose(result.gap, g - A.T @ x, atol=1e-6)
+    assert judge(scene, x).verdict == "within"
 
 
 def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path) -> None:
