@@ -152,7 +152,7 @@ class GivenModel:
 
     @property
     def stored_sparse(self) -> Assembly | None:
-        """The assembly with sparse blocks, if a large K is given so, and is no dense one in sparse storage."""
+        """The assembly with sparse blocks, if a large K is given so, and is not full of entries."""
         from problems.input import user_matrices  # slow to import
 
         if isinstance(scene := self.scene, ManufacturedScene):

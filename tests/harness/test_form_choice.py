@@ -59,7 +59,7 @@ def test_a_dense_matrix_in_sparse_storage_is_taken_for_a_dense_one(
         monkeypatch.setattr(module, "SMALL", 10)
     monkeypatch.setattr(form_choice, "SMALL_MIB", 0.0)
     K, A = sp.csc_array(12 * np.eye(12) + 1), sp.csc_array(np.eye(12, 1))
-    given = {"K": K, "A": A, "f": np.ones(12), "g": np.ones(1)}
+    given: dict[str, Any] = {"K": K, "A": A, "f": np.ones(12), "g": np.ones(1)}
     matrix_files.write(tmp_path / "own.npz", given)
     for scene in (read_scene(str(tmp_path / "own.npz")), own_matrices(**given)):
         assert chosen_form(scene, FORMS, None).form == "dual"
