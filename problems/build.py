@@ -152,14 +152,18 @@ class GivenModel:
 
     @property
     def stored_sparse(self) -> Assembly | None:
-        """The assembly with sparse blocks, if a large K is given so."""
+        """The assembly with sparse blocks, if a large K is given so, and is not full of entries."""
         from problems.input import user_matrices  # slow to import
 
         if isinstance(scene := self.scene, ManufacturedScene):
             large_sparse = scene.sparse and sum(scene.block_sizes) > user_matrices.SMALL
         else:
             large_sparse = user_matrices.holds_sparse(dict(scene.files))
-        return self._read(sparse=True)[0] if large_sparse else None
+        if not large_sparse:
+            return None
+        assembly = self._read(sparse=True)[0]
+        few = assembly.K.matrix.nnz <= DENSEST * assembly.n**2
+        return assembly if few or assembly.dependent else None
 
     @property
     def dependent(self) -> bool:

@@ -89,8 +89,8 @@ def judge(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npz or .csv.")],
     scene: SceneName,
     form: Annotated[
-        FormName, option("FORM", "The form it was computed in: of sparse, x has all unknowns.")
-    ] = "primal",
+        FormName | None, option("FORM", "The form it was computed in: of sparse, x has all unknowns.")
+    ] = None,
     limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
     reference_limit: ReferenceLimit = None,
 ) -> None:

@@ -10,7 +10,7 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from harness.planning.form_choice import chosen_form
+from harness.planning.form_choice import chosen_form, form_of_answer
 from harness.scene.solution import Source, load_scene, refuse_not_positive, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.call_lock import in_turn
@@ -18,14 +18,14 @@ from harness.solving.solver_session import forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import open_problem
 from problems.errors import InputError
-from problems.forms import FORMS, Form
+from problems.forms import Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import dual_alone
 from problems.forms.problem import in_form
-from problems.input.matrix_entries import SYMMETRY, contradictions
+from problems.input.matrix_entries import DENSEST, SYMMETRY, contradictions
 from problems.input.user_matrices import SMALL, checked
 from problems.load_cases import Listed, LoadCases
-from problems.model.scene import ManufacturedProblem, ManufacturedScene, Scene
+from problems.model.scene import JointScene, ManufacturedProblem, ManufacturedScene, Scene
 from solvers.base import Answer, Solver
 
 NOT_FINITE = "NaN or infinity"
@@ -70,10 +70,9 @@ def own_matrices(
     >>> print(f"{answer.x[0]:.3f} mm, {answer.lam[0]:.3f} N")
     0.200 mm, 30.000 N
     """
-    vectors = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
-    arrays = {name: M if sp.issparse(M) else np.asanyarray(M) for name, M in (("K", K), ("A", A))}
-    arrays |= {name: np.array(value, subok=True) for name, value in vectors.items()}
-    sparse = sp.issparse(K) and K.shape[0] > SMALL
+    given = {"K": K, "A": A, "f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
+    arrays = {name: _array(title, name, value) for name, value in given.items()}
+    sparse = sp.issparse(K) and K.shape[0] > SMALL and K.nnz <= DENSEST * K.shape[0] ** 2
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
     return ManufacturedScene.of(title, ManufacturedProblem(assembly, load), title)
 
@@ -83,7 +82,7 @@ def judge(
     x: ArrayLike,
     lam: ArrayLike | None = None,
     limit_mm: float = LIMIT_MM,
-    form: Form = "primal",
+    form: Form | None = None,
 ) -> Judgement:
     """Judge an answer that came from elsewhere, against the certified reference of the scene.
 
@@ -98,7 +97,8 @@ def judge(
     limit_mm : float, optional
         Limit on max|x − x*|, mm.
     form : str, optional
-        "primal", "dual" or "sparse"; in the sparse form nothing dense is made.
+        "primal", "dual" or "sparse"; in the sparse form nothing dense is made. By default primal; of own
+        matrices, whose x is the same in each, the cheaper one.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def judge(
     """
     refuse_not_positive("judge", limit_mm=limit_mm)
     scene = load_scene(scene)
-    problem = open_problem(scene, chosen_form(scene, FORMS, form).form)
+    problem = open_problem(scene, form_of_answer(scene, form))
     n, m = problem.prepared.assembly.n, problem.prepared.assembly.m
     x = _vector("judge", "x", x, n)
     forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)
@@ -208,7 +208,7 @@ def solve_series(
     options : dict, optional
         Options of a solver by name.
     form : str, optional
-        "primal", "dual" or "sparse"; by default the usual one of the solver.
+        "primal", "dual" or "sparse"; by default the usual one of the solver, of own matrices the cheaper one.
     tolerance : float, optional
         Passed to the solver.
     limit_mm : float, optional
@@ -238,7 +238,8 @@ def solve_series(
     refuse_not_positive("solve_series", tolerance=tolerance, limit_mm=limit_mm)
     scene = load_scene(scene)
     name, chosen = solver_named(solver, options)
-    taken = form_of(name, chosen.forms, form)
+    of_own = form is None and not isinstance(scene, JointScene)
+    taken = chosen_form(scene, chosen.forms, None).form if of_own else form_of(name, chosen.forms, form)
     first = cases if isinstance(cases, LoadCases) else Listed(())
     job = Job(
         solver=name,
@@ -282,6 +283,14 @@ def _results(session: SeriesSession, blocks: Iterable[LoadCases]) -> Iterator[Re
         results = session.solve(range(cases.first, cases.first + cases.count))
         while some := step(results, None):
             yield from some
+
+
+def _array(where: str, name: str, value: Any) -> Any:
+    """An array, or a sparse matrix as it is. Raises InputError for rows of several lengths."""
+    try:
+        return value if sp.issparse(value) else np.asanyarray(value)
+    except ValueError as error:
+        raise InputError.one(where, name, value, "rows of one length") from error
 
 
 def _numbers(where: str, name: str, value: ArrayLike, order: Literal["K", "F"] = "K") -> Matrix:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from harness.results.provenance import physical_memory_mib
 from problems.build import models_of
 from problems.errors import InputError
-from problems.forms import DENSE_FORMS, Form, default_form
+from problems.forms import DENSE_FORMS, FORMS, Form, default_form
 from problems.forms.assembly import Assembly
 from problems.input.bounded_types import MIB
 from problems.model.effect import SpringEffect
@@ -158,6 +158,17 @@ def chosen_form(scene: Scene, taken: Sequence[Form], form: Form | None, cases: i
         choice = _by_rule(size, taken, cases) if form is None else Choice(form)
     refuse_what_cannot_fit(scene, size, choice.form)
     return choice
+
+
+def form_of_answer(scene: Scene, form: Form | None) -> Form:
+    """The form in which an answer from elsewhere is judged: the one that is named, else primal.
+
+    The x of given matrices is the same in every form: the sparse one is taken where `chosen_form` takes it.
+    Raises InputError as that does.
+    """
+    if form is None and isinstance(scene, JointScene):
+        form = "primal"
+    return chosen_form(scene, ("primal", "sparse") if form is None else FORMS, form).form
 
 
 def _by_rule(size: Size | None, taken: Sequence[Form], cases: int) -> Choice:

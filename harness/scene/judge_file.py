@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from harness.planning.form_choice import form_of_answer
 from harness.results.comparison import Incomparable
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
@@ -22,6 +23,7 @@ from problems.input.bounded_types import regular_file
 from problems.input.matrix_files import reading
 from problems.input.tables import Cells, doubt, is_stray, number
 from problems.model.scene import JointScene
+from problems.scene_files import read_scene
 from report.document.numbers import error_beside, position, proven_to, upwards
 
 LARGEST_MIB = 1024
@@ -37,21 +39,22 @@ CODES = {"within": DONE, "outside": FAILED, "cannot_be_judged": NOTHING_JUDGED}
 def judge_file(
     path: Path,
     source: str,
-    form: Form,
+    form: Form | None,
     limit_mm: float,
     console: Console,
     reference_limit_s: float | None = None,
 ) -> int:
     """Print the verdict on the answer in a file; returns 0 within the limit, 1 outside, 3 if not known.
 
-    x (n,) mm, in the sparse form all N unknowns; where there is only λ (m,) N, x = K⁻¹(f − Aλ). Raises
-    InputError, Incomparable if a vector is of another length.
+    x (n,) mm, in the sparse form all N unknowns; where there is only λ (m,) N, x = K⁻¹(f − Aλ). form : see
+    `form_of_answer`. Raises InputError, Incomparable if a vector is of another length.
     """
     if not 0 < limit_mm < inf:
         raise InputError.one("--limit", "limit, mm", limit_mm, "must be positive and finite")
-    answer = read_answer(path)
-    problem = measurable(source, limit_s=reference_limit_s, form=form)
-    assembly, scene = problem.prepared.assembly, problem.scene
+    answer, scene = read_answer(path), read_scene(source)
+    form = form_of_answer(scene, form)
+    problem = measurable(scene, limit_s=reference_limit_s, form=form)
+    assembly = problem.prepared.assembly
     if SHOWN in answer and isinstance(scene, JointScene) and scene.joint.shown is not None:
         allowed = "x, all unknowns of K, as `unknowns` of solution.npz: these are displacements along normals"
         raise InputError.one(path, "names", SHOWN, allowed)

@@ -48,12 +48,21 @@ class Format:
     words: tuple[str, str] = ("node", "dof")
 
 
+def _stored(data: Data) -> Data:
+    """The data with K and A as they are stored: sparse if K is large and sparse, else dense."""
+    n = data["K"].shape[0]
+    if n > SMALL and data["K"].nnz <= DENSEST * n**2:
+        return data
+    return data | {name: data[name].toarray() for name in "KA"}
+
+
 def _write_npz(path: Path, data: Data) -> None:
     """Write the .npz that scenes open; K and A of a sparse problem as compressed columns."""
-    n = data["K"].shape[0]
-    if n <= SMALL or data["K"].nnz > DENSEST * n**2:
-        data = data | {name: data[name].toarray() for name in "KA"}
-    matrix_files.write(path, data)
+    matrix_files.write(path, _stored(data))
+
+
+def _write_op4(path: Path, data: Data) -> None:
+    nastran.write_op4(path, _stored(data))
 
 
 def _read_npz(path: Path, choose: Choose) -> Read:
@@ -85,7 +94,7 @@ FORMATS = {
         is_folder=True,
     ),
     "npz": Format("a file .npz, bit for bit", (".npz",), _write_npz, _read_npz),
-    "op4": Format("a binary file .op4, bit for bit", (".op4",), nastran.write_op4, nastran.read_op4),
+    "op4": Format("a binary file .op4, bit for bit", (".op4",), _write_op4, nastran.read_op4),
 }
 
 

@@ -59,7 +59,7 @@ def write_dmig(path: Path, data: dict[str, Any]) -> None:
         raise InputError.one(path, "contacts", 0, allowed)
     with path.open("w", encoding="ascii") as file:
         for name, M in {"K": sp.tril(data["K"]), "A": data["A"], "F": data["f"], "G": data["g"]}.items():
-            columns = sp.csc_array(M if sp.issparse(M) else M[:, None])
+            columns = sp.csc_array(M if sp.issparse(M) else M[:, None], copy=True)
             columns.eliminate_zeros()
             form = SYMMETRIC if name == "K" else COLUMNS
             if columns.nnz:

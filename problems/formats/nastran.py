@@ -1,4 +1,4 @@
-"""Nastran's OUTPUT4 by pyyeti: k, a, f, g in double precision; text or binary is read, binary is written."""
+"""Nastran's OUTPUT4 by pyyeti: matrices k, a, f, g; text or binary is read, binary is written."""
 
 import re
 import tempfile
@@ -15,7 +15,7 @@ from problems.input.matrix_files import LARGEST_MIB, Choose
 from problems.input.text_files import WIDE, read_bytes
 
 OF_PROBLEM = {"F": "f", "G": "g"}
-SYMMETRIC = 6  # form, of which some programs write one triangle
+RECTANGULAR, SYMMETRIC = 2, 6  # forms; of the latter some programs write one triangle
 GZIP = b"\x1f\x8b"
 HEADER = re.compile(r"(.{24,}?\d[ED])(\d+)(\.\d+.*)", re.IGNORECASE)  # of a matrix: the width of its numbers
 WITHOUT_LETTER = re.compile(r"(\d\.?)([-+]\d+)$")
@@ -33,15 +33,17 @@ def pyyeti(path: Path) -> Any:
 
 
 def write_op4(path: Path, data: dict[str, Any]) -> None:
-    columns = {name: data[name][:, None] for name in "fg"}
-    matrices = {"k": data["K"].toarray(), "a": data["A"].toarray()} | columns
-    pyyeti(path).op4.OP4().write(str(path), matrices, binary=True)
+    """Write k, a, f, g in double precision; what is sparse in strings of its entries, the format BIGMAT."""
+    matrices = {"k": data["K"], "a": data["A"], "f": data["f"][:, None], "g": data["g"][:, None]}
+    forms = [SYMMETRIC, *[RECTANGULAR] * 3]  # of an almost symmetric A, pyyeti would say that it is
+    pyyeti(path).op4.OP4().write(str(path), [*matrices], [*matrices.values()], binary=True, forms=forms)
 
 
 def read_op4(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | None]]:
     """Read the chosen matrices by name, in capitals. Raises InputError if two of a name differ."""
     reader = pyyeti(path).op4.OP4()
-    reader._check_name = lambda name: name.strip(" \0").upper()  # pyyeti's renames what is no word of Python
+    # pyyeti renames what is no word of Python. Files of 64 bits have four blanks after each four letters.
+    reader._check_name = lambda name: re.sub("[ \0]", "", name).upper()
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")  # such as a premature end
         names, matrices, forms, _ = reader.load(str(_plain(path, Path(folder))), into="list", sparse=None)
@@ -51,7 +53,7 @@ def read_op4(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | No
         if form == SYMMETRIC and one_sided(sp.csr_array(M)):
             M = mirrored(sp.csr_array(M))
         first = by_name.setdefault(name, M)
-        if M.shape != first.shape or sp.coo_array(M - first).count_nonzero():
+        if M is not first and (M.shape != first.shape or sp.coo_array(M - first).count_nonzero()):
             allowed = f"another {written} is before it, with other entries: each matrix needs its own name"
             raise InputError.one(path, f"matrix {at + 1} of {len(names)}", written, allowed)
     return {name: (by_name[name], None) for name in choose(list(by_name))}

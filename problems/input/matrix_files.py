@@ -102,7 +102,10 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
                     raise InputError.one(path, name, [name, f"{name}_data"], allowed)
             names = stems + [name for name in plain if name in expected or _kind(archive, name) in NUMBERS]
             wanted = choose(names)
-            chosen = {name: unpacked(archive, name) if name in stems else archive[name] for name in wanted}
+            chosen = {
+                name: unpacked(archive, name) if name in stems else np.atleast_1d(archive[name])
+                for name in wanted
+            }
     for name, M in chosen.items():
         if sp.issparse(M):
             _refuse_damaged(name, M)

@@ -89,7 +89,6 @@ def read_matrices(files: Files, sparse: bool = False) -> tuple[Assembly, LoadCas
         kind, where = (".npz with K, A, f, g", "file") if one else ("Matrix Market file", key)
         with matrix_files.reading(path, where, f"a readable {kind}"):
             data |= matrix_files.read(path, list, NAMES) if one else {key: matrix_files.read_mtx(path)}
-    data |= {key: data[key].toarray() for key in "fg" if sp.issparse(data.get(key))}
     return checked(data, {key: str(files.get("problem") or files.get(key)) for key in NAMES}, sparse)
 
 
@@ -106,17 +105,19 @@ def checked(
             raise InputError(wrong)
 
     refuse((key, key, None, "is missing") for key in "KAfg" if key not in data)
+    data = {k: M.toarray() if k in ("f", "g", "nodes") and sp.issparse(M) else M for k, M in data.items()}
     refuse(_wrong_kinds(data))
     K, A = (sp.csr_array(data[key], dtype=float, copy=True) for key in "KA")
-    f, g = (np.asarray(data[key], dtype=float).ravel() for key in "fg")
-    nodes = np.asarray(data["nodes"], dtype=float) if "nodes" in data else None
+    for M in (K, A):
+        M.sum_duplicates()
+        M.eliminate_zeros()  # a contact is at the first unknown of its column
+    f, g = (np.array(data[key], dtype=float).ravel() for key in "fg")
+    nodes = np.array(data["nodes"], dtype=float) if "nodes" in data else None
     refuse([("K", "K.shape", K.shape, "at least one unknown")] if K.shape[0] == 0 else [])
     refuse(_wrong_entries(K, A, f, g, nodes))
     refuse(_wrong_units(K, A))
     strays = [key for key in data if key not in NAMES]
     refuse(_wrong_strays({key: data[key] for key in strays}, A.shape))
-    K.sum_duplicates()
-    K.eliminate_zeros()
     refuse_no_stiffness(where.get("K", "matrices"), K, "K")
     skew = abs(K - K.T).max()
     notes = []
@@ -146,7 +147,8 @@ def _wrong_kinds(data: Mapping[str, Any]) -> Faults:
 
 
 def _wrong_entries(K: sp.csr_array, A: sp.csr_array, f: Vector, g: Vector, nodes: Matrix | None) -> Faults:
-    n, m = K.shape[0], A.shape[1]
+    n = K.shape[0]
+    m = A.shape[1] if A.shape[0] == n else len(g)
     shapes = {"K": (K.shape, (n, n)), "A": (A.shape, (n, m)), "f": (f.shape, (n,)), "g": (g.shape, (m,))}
     if nodes is not None:
         shapes["nodes"] = (nodes.shape, (n, 2))

@@ -1,16 +1,22 @@
 """A scene's size and memory, before anything is built, and the form it is solved in by default."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import scipy.sparse as sp
 
+from harness import own_matrices
+from harness.commands import plain_arrays
 from harness.planning import form_choice
 from harness.planning.form_choice import chosen_form, refuse_what_cannot_fit, size_of
 from harness.scene import validate
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms import Form
+from problems.input import matrix_files, user_matrices
 from problems.model.joint_model import JointModel
 from problems.scene_files import read_scene
 from problems.stiffness.band_factor import half_bandwidth
@@ -43,6 +49,20 @@ def test_the_stored_matrices_of_the_dense_forms_are_known_before_they_are_made()
     estimate = size_of(scene)
     assert estimate is not None
     assert estimate.dense_mib == pytest.approx(stored / 2**20)
+
+
+def test_a_dense_matrix_in_sparse_storage_is_taken_for_a_dense_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was solved in the sparse form, which refuses it."""
+    for module in (user_matrices, plain_arrays):
+        monkeypatch.setattr(module, "SMALL", 10)
+    monkeypatch.setattr(form_choice, "SMALL_MIB", 0.0)
+    K, A = sp.csc_array(12 * np.eye(12) + 1), sp.csc_array(np.eye(12, 1))
+    given: dict[str, Any] = {"K": K, "A": A, "f": np.ones(12), "g": np.ones(1)}
+    matrix_files.write(tmp_path / "own.npz", given)
+    for scene in (read_scene(str(tmp_path / "own.npz")), own_matrices(**given)):
+        assert chosen_form(scene, FORMS, None).form == "dual"
 
 
 def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:

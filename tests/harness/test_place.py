@@ -291,6 +291,8 @@ def test_a_case_of_which_nothing_is_proven_is_named() -> None:
     said, passed = sentence_on(found, Goal(0.5, 1.0), np.zeros((1, 2)))
     assert said.endswith("of 2 fresh cases (95 % interval 10.0 to 90.0 %); nothing is proven of case 8.")
     assert not passed
+
+
 def test_what_is_not_proven_is_not_said_to_be(strip: Path) -> None:
     """Of a plan without a limit, after a stage that is not proven."""
     step = Step(plans_of(strip, 1, 4), np.inf, Outcome((np.inf,), (0,), (0.1,)))
@@ -713,17 +715,6 @@ def test_holes_are_checked_where_plans_have_them(strip: Path, tmp_path: Path) ->
     (tmp_path / "holes.csv").write_text("x,y\n200.0000004,10\n10,10\n")
     movable = MovableFasteners.of(read_scene(str(strip)))
     assert movable.candidates(str(tmp_path / "holes.csv"))[0] == ((10.0, 10.0), (200.0, 10.0))
-
-
-def test_a_mark_of_missing_gaps_leaves_out_no_hole(strip: Path, tmp_path: Path) -> None:
-    (tmp_path / "holes.csv").write_text("x,y\n10,0\n20,10\n")
-    movable, options = MovableFasteners.of(read_scene(str(strip))), TableOptions(missing=(0,))
-    assert movable.candidates(str(tmp_path / "holes.csv"), options)[0] == ((10.0, 0.0), (20.0, 10.0))
-
-
-def test_marks_of_missing_gaps_are_refused_beside_holes_alone() -> None:
-    (fault,) = GapCases(options=TableOptions(missing=(0,))).faults(table=True)
-    assert fault.where == "--missing"
 
 
 class ReachedError(Exception):

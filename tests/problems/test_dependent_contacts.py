@@ -100,6 +100,7 @@ def test_small_integers_are_refused_exactly_where_their_rank_says_so() -> None:
         ("solve OWN --out NEW", False),
         ("validate OWN", False),
         ("judge X OWN --form sparse", False),
+        ("judge X OWN", False),
         ("export OWN --format npz --out NEW.npz", False),
         ("series OWN --solver newton --form sparse --gaps GAPS --out NEW", False),
         ("run --scene OWN --solver newton --form sparse --out NEW", False),

@@ -1,6 +1,7 @@
 """Files of other codes, in all spellings of one K: the same K, or one sentence that names the place."""
 
 import gzip
+import struct
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
@@ -173,6 +174,21 @@ def test_one_matrix_of_several_is_chosen_by_name(form: str) -> None:
 
 def test_an_indented_card_does_not_continue_the_one_above() -> None:
     np.testing.assert_array_equal(read(text("dmig", LOWER) + b" SPC1,1,,1.0\n", "KAA.pch"), K)
+
+
+def test_an_op4_file_of_one_matrix_with_nan_has_no_other_one_of_its_name() -> None:
+    pyyeti(Path()).op4.OP4().write("KAA.op4", ["kaa"], [np.diag([4.0, np.nan])], forms=[1])
+    with pytest.raises(InputError, match=r"K\[1, 1\] = .NaN or infinity"):
+        read(Path("KAA.op4").read_bytes(), "KAA.op4")
+
+
+def test_a_name_in_an_op4_file_of_64_bits_has_no_blanks() -> None:
+    """Nastran puts four letters into a word of eight bytes."""
+    content = struct.pack("<i4q16si", 48, 2, 2, 6, 2, b"STIF    FNES    ", 48)
+    for j, column in enumerate(K.T.tolist(), start=1):
+        content += struct.pack("<i3q2di", 40, j, 1, 2, *column, 40)
+    content += struct.pack("<i3qdi", 32, 3, 1, 1, 1.0, 32)
+    np.testing.assert_array_equal(read(content, "KAA.op4", "STIFFNES"), K)
 
 
 def test_signs_in_paths_are_no_names() -> None:

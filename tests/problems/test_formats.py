@@ -18,6 +18,7 @@ from refusals import refusal_of
 from rich.console import Console
 from small_problems import make_load, make_prepared, solve_by_nnls
 
+from harness import own_matrices, solve
 from harness.scene.export import export, matrices
 from harness.scene.import_files import import_matrices
 from harness.scene.solve import solve_into
@@ -55,6 +56,25 @@ def test_a_round_trip_is_bit_for_bit(form: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(read_back[name], wanted[name])
     if form == "npz":
         np.testing.assert_array_equal(read_back["nodes"], wanted["nodes"])
+
+
+@pytest.mark.parametrize("form", formats.FORMATS)
+def test_a_scene_that_was_solved_is_exported(form: str, tmp_path: Path) -> None:
+    """Solvers are given its matrices read-only."""
+    scene = own_matrices(2 * np.eye(2), np.eye(2), [1.0, 3.0], [1.0, 1.0])
+    assert solve(scene, "gi").has_contact
+    export(scene, tmp_path / PATHS[form], format=form)
+    import_matrices(files_of(form, tmp_path / PATHS[form]), tmp_path / "back.npz")
+    np.testing.assert_array_equal(np.load(tmp_path / "back.npz")["A"], np.eye(2))
+
+
+def test_an_almost_symmetric_A_comes_back_from_op4_as_it_was(tmp_path: Path) -> None:
+    """pyyeti calls a matrix symmetric whose entries differ by 1e-8, of which one triangle would count."""
+    A = np.array([[1.0, 0.0], [1e-9, 1.0]])
+    data = {"K": sp.csr_array(np.eye(2)), "A": sp.csc_array(A), "f": np.ones(2), "g": np.ones(2)}
+    formats.FORMATS["op4"].write(tmp_path / "p.op4", data)
+    found, _ = formats.read_labelled(tmp_path / "p.op4")["A"]
+    np.testing.assert_array_equal(found, A)
 
 
 def test_dmig_keeps_ten_digits(tmp_path: Path) -> None:

@@ -201,6 +201,31 @@ def test_a_stiff_spring_beside_a_soft_one_is_no_part_that_moves(form: Form) -> N
     np.testing.assert_allclose(solve(scene, form=form).x, [1.0, 1e-15], rtol=1e-14)
 
 
+def test_a_contact_is_at_its_entries_not_at_its_zeros() -> None:
+    """A lists a zero at the first unknown, and the entry of the second in two parts."""
+    A = sp.csc_array(([0.0, 0.25, 0.75], [0, 1, 1], [0, 3]), shape=(2, 1))
+    scene = own_matrices(np.eye(2), A, [0.0, 1.0], [0.2], nodes=[[0.0, 0.0], [5.0, 0.0]])
+    assembly = prepared(scene).assembly
+    np.testing.assert_array_equal(assembly.A.data, [1.0])
+    np.testing.assert_array_equal(assembly.contact_nodes, [[5.0, 0.0]])
+
+
+def test_sparse_loads_and_gaps_are_vectors() -> None:
+    f, g = sp.csc_array(np.array([[2.0], [0.0]])), sp.coo_array(np.ones((2, 1)))
+    np.testing.assert_allclose(solve(own_matrices(np.eye(2), np.eye(2), f, g)).x, [1.0, 0.0], atol=1e-15)
+
+
+def test_rows_of_several_lengths_are_no_matrix() -> None:
+    with pytest.raises(InputError, match=r"K = \[\[1.0, 0.0\], \[0.0\]\]: rows of one length"):
+        own_matrices([[1.0, 0.0], [0.0]], np.eye(2), np.ones(2), np.ones(2))
+
+
+def test_a_contact_in_a_row_of_A_is_asked_for_as_a_column() -> None:
+    with pytest.raises(InputError) as caught:
+        own_matrices(np.eye(2), [[1.0, 0.0]], np.ones(2), np.ones(1))
+    assert [str(fault) for fault in caught.value.faults] == ["own matrices: A.shape = (1, 2): must be (2, 1)"]
+
+
 def test_own_sparse_matrices_that_are_nearly_singular_are_refused_as_a_file_is() -> None:
     """A chain of 2001 masses that a spring of 1e-12 N/mm holds to the ground."""
     n = 2001

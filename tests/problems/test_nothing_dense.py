@@ -16,7 +16,7 @@ from scipy.sparse.linalg import spsolve
 from small_joints import two_parts
 from sparse_matrices import band_matrix, renumbered
 
-from harness import load_scene, own_matrices, solve
+from harness import LoadCase, judge, load_scene, own_matrices, solve, solve_series
 from harness.planning import form_choice
 from problems import formats, storage
 from problems.build import load_case, prepared
@@ -175,6 +175,17 @@ def test_tens_of_thousands_of_separate_unknowns_are_solved() -> None:
     assert abs(found.x - exact).max() <= found.error_bound_mm <= 1e-12
 
 
+def test_a_series_and_a_judgement_of_an_own_sparse_K_make_nothing_dense() -> None:
+    K = sp.diags_array([np.full(N, 4.0), -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], format="csc")
+    A, f, g = sp.eye_array(N, M, format="csc"), np.linspace(9.0, 0.0, N), np.ones(M)
+    scene = own_matrices(K, A, f, g)
+    x = solve(scene).x
+    (result,) = solve_series(scene, [LoadCase(f, g)])
+    assert result.row["verdict"] == "within"
+    np.testing.assert_allclose(result.gap, g - A.T @ x, atol=1e-6)
+    assert judge(scene, x).verdict == "within"
+
+
 def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path) -> None:
     ends = np.array([1.0, *[2.0] * (N - 2), 1.0])
     chain = sp.diags_array([ends, -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], shape=(N, N))
@@ -184,6 +195,17 @@ def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path
     assert "K.mtx" in said
     assert "is a part held against every rigid motion?" in said
     assert not (tmp_path / "mine.npz").exists()
+
+
+def test_a_large_sparse_K_is_sparse_in_an_op4_file(tmp_path: Path) -> None:
+    K = sp.diags_array([np.full(N, 4.0), -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], format="csr")
+    data = {"K": K, "A": sp.eye_array(N, M, format="csc"), "f": np.ones(N), "g": np.ones(M)}
+    formats.FORMATS["op4"].write(tmp_path / "p.op4", data)
+    found = formats.read_labelled(tmp_path / "p.op4")
+    for name in "KA":
+        matrix, _ = found[name]
+        assert sp.issparse(matrix)
+        assert abs(sp.csr_array(matrix) - data[name]).max() == 0
 
 
 def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:

@@ -60,6 +60,7 @@ FILES: dict[str, tuple[Callable[[Path], list[Tables]], str, str, str]] = {
     "two nodes at one place": (lambda f: two(f, xyz=DOUBLED), "x, y, z", "1 and 2", "one node at each"),
     "asymmetric": (lambda f: two(f, ASYMMETRIC), "K[0, 1] and K[1, 0]", "[3.0, 0.0]", "1e-10"),
     "not finite": (lambda f: two(f, INFINITE), "K", "NaN or infinity", "finite"),
+    "a number for a matrix": (lambda f: two(f, np.array(5.0)), "K", "shape (1,)", "must be matrices"),
     "a normal too short": (lambda f: two(f, normals=SHORT), "nx, ny, nz", "5", "length 1"),
     "contact of neither": (lambda f: two(f, contact=[2, *[1] * 23]), "contact", "ids 1", "0 or 1"),
     "no surface": (lambda f: two(f, contact=[1, 1, *[0] * 22]), "contact", "2", "at least three"),
