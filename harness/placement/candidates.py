@@ -92,11 +92,13 @@ class MovableFasteners:
 
     def faults(self, points: Matrix, source: str) -> list[Fault]:
         """One fault for each point off the parts, there twice, or where a fastener stays installed."""
+        if not len(points):
+            return []
         joint = self.bare.joint
         off = np.flatnonzero(~self._on_parts(points))
         faults = [Fault(source, "x, y", points[k].tolist(), on_junction(joint)) for k in off]
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
-        for installed in self.bare.effects_of(SpringEffect) if len(points) and not self.scene.stages else ():
+        for installed in () if self.scene.stages else self.bare.effects_of(SpringEffect):
             faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
         return faults + _twice(points, source)
 
