@@ -150,9 +150,9 @@ def tolerance(
     key, grid = keys[name], np.linspace(low, high, ceil(1 / resolution - 1e-9) + 1)
     values = [*dict.fromkeys(float(f"{value:.10g}") for value in grid)]
     assert isinstance(read, JointScene)  # which alone has keys
-    tried = (key.faults(read, value, f"--find {name}") for value in (*values[:2], values[-1]))
-    if wrong := next(filter(None, tried), []):
-        raise InputError(wrong)
+    for tried in (*values[:2], values[-1]):
+        if wrong := key.faults(read, tried, f"--find {name}"):
+            raise InputError(wrong)
 
     def gaps(value: float, seed: int | None = None) -> tuple[Vector, Vector]:
         """Bounds on the largest gap in each case at a value, below and above, (N,) mm; NaN without an answer.

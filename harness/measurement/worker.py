@@ -116,9 +116,9 @@ class Run(Reporter):
         """Solve the load cases; yields the last event of each row."""
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
-        if plugin and plugin.stem == m.solver:
-            self.events.report(plugin_version=solver_version(m.solver, plugin))
         solver = make_solver(m.solver, m.entry.options, plugin)
+        if plugin and plugin.stem == m.solver:  # after its import, which may add folders of code
+            self.events.report(plugin_version=solver_version(m.solver, plugin))
         own = {"time_limit_s": OWN_LIMIT * m.time_limit_s, "iteration_limit": m.iteration_limit}
         vars(solver).update(own, prints=True)  # it may be frozen
         if m.form not in solver.forms:

@@ -166,9 +166,9 @@ def form_of_answer(scene: Scene, form: Form | None) -> Form:
     The x of given matrices is the same in every form: the sparse one is taken where `chosen_form` takes it.
     Raises InputError as that does.
     """
-    if form is None and isinstance(scene, JointScene):
-        form = "primal"
-    return chosen_form(scene, ("primal", "sparse") if form is None else FORMS, form).form
+    if form is None and not isinstance(scene, JointScene):
+        return chosen_form(scene, ("primal", "sparse"), None).form
+    return chosen_form(scene, FORMS, form or "primal").form
 
 
 def _by_rule(size: Size | None, taken: Sequence[Form], cases: int) -> Choice:

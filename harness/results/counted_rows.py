@@ -22,7 +22,7 @@ def chosen(rows: pd.DataFrame, line: Sequence[str]) -> pd.Series[bool]:
     if not searched.any():
         return ~searched
     within = rows["tolerance"].where(first & (rows["verdict"] == "within"))
-    merged = rows.duplicated([*line, "tolerance", "repeat"]).any()
+    merged = rows[searched].duplicated([*line, "tolerance", "repeat"]).any()
     search = [*line, *(["machine"] if merged else [])]
     by_line = rows.assign(within=within).groupby(search, dropna=False)
     best, last = by_line["within"].transform("max"), by_line["tolerance"].transform("min")

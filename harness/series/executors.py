@@ -23,7 +23,7 @@ from harness.terminal.console import ConsoleReporter
 from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError
-from solvers.registry import solver_version
+from solvers.registry import make_solver, solver_version
 
 from .session import BLOCK, Job, Result, SeriesSession
 from .staged import StagedSession, session_of
@@ -99,8 +99,9 @@ def solve_isolated(
 def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
     """Solve the cases of a task in the child process; each result is an event."""
     job, numbers, batched = task
-    refuse_other_files(job)
-    session = SeriesSession(job, report=events.report, batched=batched)
+    solver = make_solver(job.solver, job.solver_options, job.plugin)
+    refuse_other_files(job)  # after its import, which may add folders of code
+    session = SeriesSession(job, solver, events.report, batched)
     for some in session.solve(numbers):
         for result in some:
             events.report(row=result.row, gap=result.gap)

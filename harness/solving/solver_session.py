@@ -193,7 +193,9 @@ def replaced(solver: Solver) -> list[str]:
 
 def copied(load: LoadCase) -> LoadCase:
     """A read-only copy for a solver: what compiled code writes into it changes no other load case."""
-    arrays = {name: value.copy() for name, value in vars(load).items() if isinstance(value, np.ndarray)}
+    arrays: dict[str, Any] = {
+        name: value.copy() for name, value in vars(load).items() if isinstance(value, np.ndarray)
+    }
     return read_only(replace(load, **arrays))
 
 

@@ -207,6 +207,14 @@ def test_workers_on_two_machines_share_a_search_and_merged_runs_do_not(
     assert read(write_rows(tmp_path, rows)).rows["tolerance"].tolist() == kept
 
 
+def test_rows_of_rounds_do_not_divide_a_search_on_two_machines() -> None:
+    """They repeat a measurement, as the rows of merged runs do."""
+    search = {"a": (1e-5, "outside"), "b": (1e-6, "within")}
+    rows = [row(searched=True, machine=at, tolerance=tol, verdict=how) for at, (tol, how) in search.items()]
+    rows += [row(solver="gi", round=begun) for begun in (None, "2026-01-01T00:00:00+00:00")]
+    assert [each["tolerance"] for each in counting(rows)] == [1e-6, 1e-9, 1e-9]
+
+
 def test_runs_that_a_trace_stopped_are_not_compared(tmp_path: Path) -> None:
     """A method that takes fewer iterations than before has fewer of them."""
     stopped = [row(variant=f"stopped at {k}", iteration_limit=k) for k in (1, 2, 4)]

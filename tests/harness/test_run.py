@@ -172,14 +172,6 @@ def test_all_rows_are_set_aside_in_one_pass(copy: Path) -> None:
     assert len(records.read(copy / records.OUTDATED)) == len(rows)
 
 
-def test_a_torn_line_of_rows_set_aside_is_removed(copy: Path) -> None:
-    """Also by a run that sets none aside."""
-    (copy / records.OUTDATED).write_bytes(b'{"key": "old"}\n{"to')
-    plan = expand(read_written(copy / "suite.toml"))
-    assert resumed(copy, [], plan, {}, Console(quiet=True)) == []
-    assert records.read(copy / records.OUTDATED) == [{"key": "old"}]
-
-
 def test_no_row_of_a_scene_that_has_changed_stays(copy: Path) -> None:
     """Whatever its solver and round, planned or not; those of the scene as it is, and of others, do."""
     first = rows_of(copy)[0]

@@ -105,6 +105,18 @@ def test_a_solver_that_goes_to_another_folder_is_measured(
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
+@pytest.mark.usefixtures("own_cache")
+def test_a_plug_in_that_adds_a_folder_of_code_is_the_one_described(tmp_path: Path) -> None:
+    """What it imports from there is part of its version."""
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "added_code.py").touch()
+    plugin = write(tmp_path, f"sys.path.insert(0, {str(tmp_path / 'more')!r}); import added_code")
+    suite, out = tiny_joint.write_suite(tmp_path), tmp_path / "out"
+    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", out)
+    assert done.exit_code == 0, done.output
+    assert [row["verdict"] for row in rows_of(out)] == ["within"]
+
+
 def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
     with pytest.raises(InputError, match="solver mine: forms"):

@@ -114,9 +114,17 @@ def test_another_plug_in_than_the_one_described_is_refused(tmp_path: Path) -> No
         list(solve_isolated(job, [0, 1]))
 
 
+def test_a_series_with_a_plug_in_that_adds_a_folder_of_code_is_solved(tmp_path: Path) -> None:
+    """What it imports from there is part of its version."""
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "added_code.py").touch()
+    done = harness(*series(tmp_path, f"sys.path.insert(0, {str(tmp_path / 'more')!r}); import added_code"))
+    assert done.exit_code == 0, done.output
+
+
 def test_answers_are_proven_on_the_loads_as_they_were(tmp_path: Path) -> None:
     """Compiled code writes into arrays whatever their flags say: the bound was of the changed load case."""
-    write_by_force = "load.g.flags.writeable = True; load.g += 1.0"
+    write_by_force = "load.g.flags.writeable = True; load.g[:] += 1.0"
     done = harness(*series(tmp_path, in_solve=write_by_force))
     assert done.exit_code == 0, done.output
     verdicts = [row["verdict"] for row in series_file.rows(tmp_path / "out")]
