@@ -116,7 +116,7 @@ def test_another_plug_in_than_the_one_described_is_refused(tmp_path: Path) -> No
 
 def test_answers_are_proven_on_the_loads_as_they_were(tmp_path: Path) -> None:
     """Compiled code writes into arrays whatever their flags say: the bound was of the changed load case."""
-    write_by_force = "load.g.flags.writeable = True; load.g += 1.0"
+    write_by_force = "load.g.flags.writeable = True; load.g[:] += 1.0"
     done = harness(*series(tmp_path, in_solve=write_by_force))
     assert done.exit_code == 0, done.output
     verdicts = [row["verdict"] for row in series_file.rows(tmp_path / "out")]
