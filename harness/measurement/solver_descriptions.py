@@ -205,7 +205,6 @@ def resumed(
     old: list[Row] = []
     for row in rows:
         (old if is_old(row) else valid).append(row)
-    records.remove_torn_line(directory / records.OUTDATED)  # which a report reads, too
     if old:
         records.append(directory / records.OUTDATED, *(row | {"answer": None, "log": None} for row in old))
         records.rewrite(directory / records.MEASUREMENTS, valid)
