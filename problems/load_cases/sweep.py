@@ -170,8 +170,8 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
             break
     if faults:
         raise InputError(faults)
-    whole = [text.partition("=") for text in texts if re.fullmatch(r"[^=]+=-?\d+,\d+", text)]
-    notes = tuple(f"--sweep {name} has two values, {two}: decimals have a point" for name, _, two in whole)
+    whole = filter(None, (re.fullmatch(r"\s*([^=]+?)\s*=\s*(-?\d+,\d+)\s*", text) for text in texts))
+    notes = tuple(f"--sweep {one[1]} has two values, {one[2]}: decimals have a point" for one in whole)
     return Sweep(scene, steps, count, form, notes)
 
 

@@ -125,9 +125,7 @@ def test_a_row_that_lacks_what_a_run_reads_is_named(copy: Path, folder: Path, na
     rows = rows_of(copy)
     del rows[1][name]
     records.rewrite(copy / records.MEASUREMENTS, rows)
-    done = harness("run", folder / "small.toml", "--out", copy)
-    assert done.exit_code == 2
-    assert f"line 2: {name}" in done.stderr
+    assert f"line 2: {name}" in wrong_usage("run", folder / "small.toml", "--out", copy)
 
 
 def test_scenes_that_cannot_be_read_end_a_run_before_it_measures(
@@ -138,9 +136,7 @@ def test_scenes_that_cannot_be_read_end_a_run_before_it_measures(
     monkeypatch.setattr("harness.measurement.task.measure", lambda batch, _: measured.append(batch[0].key))
     records.rewrite(copy / records.MEASUREMENTS, rows_of(copy)[:2])
     (copy / "problems.jsonl").write_text('{"n": 3}\n')
-    done = harness("run", folder / "small.toml", "--out", copy)
-    assert done.exit_code == 2
-    assert "problems.jsonl: line 1: scene" in done.stderr
+    assert "problems.jsonl: line 1: scene" in wrong_usage("run", folder / "small.toml", "--out", copy)
     assert measured == []
 
 

@@ -240,6 +240,11 @@ def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, data: Prepared
         np.testing.assert_array_equal(cases.load(k).g, wanted.g)
 
 
+def test_a_comma_between_digits_in_a_sweep_is_said_to_make_two_values(scene: Scene) -> None:
+    cases = sweep(scene, ["fasteners.preload = 50,5 "])
+    assert cases.notes == ("--sweep fasteners.preload has two values, 50,5: decimals have a point",)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
