@@ -22,8 +22,8 @@ from problems.forms import Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import dual_alone
 from problems.forms.problem import in_form
-from problems.input.matrix_entries import DENSEST, SYMMETRY, contradictions
-from problems.input.user_matrices import SMALL, checked
+from problems.input.matrix_entries import SYMMETRY, contradictions
+from problems.input.user_matrices import checked, is_large_sparse
 from problems.load_cases import Listed, LoadCases
 from problems.model.scene import JointScene, ManufacturedProblem, ManufacturedScene, Scene
 from solvers.base import Answer, Solver
@@ -72,8 +72,7 @@ def own_matrices(
     """
     given = {"K": K, "A": A, "f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
     arrays = {name: _array(title, name, value) for name, value in given.items()}
-    sparse = sp.issparse(K) and K.shape[0] > SMALL and K.nnz <= DENSEST * K.shape[0] ** 2
-    assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
+    assembly, load = checked(arrays, dict.fromkeys(arrays, title), is_large_sparse(K))
     return ManufacturedScene.of(title, ManufacturedProblem(assembly, load), title)
 
 

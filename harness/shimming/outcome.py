@@ -32,9 +32,9 @@ def sentence_of(result: SearchOutcome, goal: Goal, study: ShimStudy) -> tuple[st
     least = step or min(result.steps, key=lambda step: step.gap_mm)
     figures = least.outcome.further[least.worst]
     gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
-    most = "".join(f", {beside(limit)(value)} {unit}" for value, limit, unit in more if limit < inf)
+    others = "".join(f", {beside(most)(value)} {unit}" for value, most, unit in more if most < inf)
     largest = beside(limit)(gaps.max())
-    leave = f"{largest} mm{most} of {goal.limit_mm:g} mm{goal.also} allowed"
+    leave = f"{largest} mm{others} of {goal.limit_mm:g} mm{goal.also} allowed"
     if step is None:
         words = "no shims of the stock are found with which all limits are kept; the best tried leave"
         at = [*(f"in patch {patch.name}" for patch in study.patches), "beyond all patches"]

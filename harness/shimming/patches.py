@@ -115,8 +115,8 @@ def checked_patches(
     patches, sound, pairs = [], [shape for shape in shapes if len(shape[1]) >= 3], tuple(pairs)
     sheets = [Shims(kind="shims", thickness=1.0, outline=outline) for _, outline, _ in sound]
     for pair, ((name, outline, at), sheet) in product(pairs, zip(sound, sheets, strict=True)):
-        here, somewhere = (sheet.covers(places_of(joint, some), joint).any() for some in ([pair], pairs))
-        if not here and (somewhere or not at):
+        here = sheet.covers(joint.places(pair), joint).any()
+        if not here and (not at or sheet.covers(places_of(joint, pairs), joint).any()):
             continue
         between, where = (None, "") if len(joint.pairs) == 1 else (pair, f" {'–'.join(pair)}")
         shim = sheet.model_copy(update={"between": between})

@@ -169,21 +169,8 @@ def _in_own_units(answer: Answer, units: Units) -> Answer:
     """The answer with λ and x in the problem's units; what is no Answer stays, to be refused."""
     if units.unchanged or not isinstance(answer, Answer):
         return answer
-    lam, x = units.answer(_array(answer.lam), _array(answer.x))
+    lam, x = units.answer(answer.lam, answer.x)
     return replace(answer, lam=lam, x=x)
-
-
-def _array(value: Any) -> Any:
-    """An array of NumPy of what can be one, as of JAX or PyTorch; what cannot stays, to be refused, and so
-    does a masked array.
-    """
-    if isinstance(value, np.ndarray):
-        return value
-    try:
-        array = np.asarray(value)
-    except Exception:  # of a class of the user's
-        return value
-    return array if array.dtype.kind in "fiu" else value
 
 
 def replaced(solver: Solver) -> list[str]:

@@ -13,9 +13,9 @@ import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input import matrix_files
-from problems.input.matrix_entries import DENSEST, refuse_no_stiffness, refuse_twice
+from problems.input.matrix_entries import refuse_no_stiffness, refuse_twice
 from problems.input.matrix_files import Choose
-from problems.input.user_matrices import NAMES, SMALL
+from problems.input.user_matrices import NAMES, is_large_sparse
 
 from . import dmig, matrix_text, nastran
 
@@ -50,8 +50,7 @@ class Format:
 
 def _stored(data: Data) -> Data:
     """The data with K and A as they are stored: sparse if K is large and sparse, else dense."""
-    n = data["K"].shape[0]
-    if n > SMALL and data["K"].nnz <= DENSEST * n**2:
+    if is_large_sparse(data["K"]):
         return data
     return data | {name: data[name].toarray() for name in "KA"}
 

@@ -127,6 +127,9 @@ def _median(values: Vector) -> float:
 
 
 def _times(units: Vector, answer: Any) -> Any:
-    vector = np.asarray(answer) if isinstance(answer, list | tuple) else answer
-    real = isinstance(vector, np.ndarray) and vector.dtype.kind in "fiu" and vector.shape == units.shape
+    try:  # also of a list, or an array of JAX or PyTorch
+        vector = answer if isinstance(answer, np.ndarray) else np.asarray(answer)
+    except Exception:  # of a class of the user's
+        return answer
+    real = vector.dtype.kind in "fiu" and vector.shape == units.shape
     return units * vector if real else answer

@@ -17,7 +17,7 @@ from problems.storage import fingerprint
 
 from . import matrix_files
 from .bounded_types import LARGEST
-from .matrix_entries import refuse_no_stiffness
+from .matrix_entries import DENSEST, refuse_no_stiffness
 
 Files = Mapping[str, Path]
 #: (matrix, key, value, what is allowed)
@@ -60,6 +60,11 @@ def stored_matrices(files: Files, files_key: str, sparse: bool) -> tuple[Assembl
 def content_key(files: Files) -> str:
     """The hash of the content of files of matrices."""
     return storage.digest(list(files), *(path.read_bytes() for path in files.values()))
+
+
+def is_large_sparse(K: Any) -> bool:
+    """Whether K is stored as a sparse matrix, large and not full of entries, and stays one."""
+    return bool(sp.issparse(K) and K.shape[0] > SMALL and K.nnz <= DENSEST * K.shape[0] ** 2)
 
 
 def holds_sparse(files: Files) -> bool:

@@ -24,8 +24,7 @@ from problems.formats import read_stiffness
 from problems.forms.assembly import Indices, Matrix
 from problems.input import matrix_files
 from problems.input.bounded_types import PLAIN, Name, regular_file
-from problems.input.matrix_entries import DENSEST
-from problems.input.user_matrices import SMALL, UNCHANGED, checked
+from problems.input.user_matrices import UNCHANGED, checked, is_large_sparse
 from problems.storage import fingerprint
 
 from .joint import Table
@@ -103,7 +102,7 @@ class StiffnessFile:
         as_read, labels, unread = read_stiffness(path, self.matrix)
         n = as_read.shape[0]
         nothing = {"A": sp.csc_array((n, 0)), "f": np.zeros(n), "g": np.zeros(0)}
-        sparse = sp.issparse(as_read) and n > SMALL and as_read.nnz <= DENSEST * n**2
+        sparse = is_large_sparse(as_read)
         assembly, _ = checked({"K": as_read} | nothing, dict.fromkeys("KAfg", str(path)), sparse=True)
         if _hash(path) != self.content:
             raise InputError.one(path, "superelement", "changed", UNCHANGED)

@@ -70,7 +70,7 @@ def digits_beside(limit: float, value: float, least: int = 3) -> int:
 
 def error_beside(limit: float, error: float) -> str:
     """1.00004e-07 beside 1e-07: four digits, or as many as show an error on its side of a limit."""
-    return f"{error:.{max(digits_beside(limit, error), 4) - 1}e}"
+    return f"{error:.{digits_beside(limit, error, least=4) - 1}e}"
 
 
 def beside(limit: float) -> Callable[[object], str]:

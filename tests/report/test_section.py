@@ -213,6 +213,7 @@ def test_a_value_is_shown_on_its_side_of_a_limit() -> None:
     assert [beside(0.05)(value) for value in (np.inf, None, np.nan)] == ["inf", "–", "–"]
     errors = [error_beside(1e-7, value) for value in (2e-7, 1.000004e-7, 1e-7, 3.21e-12)]
     assert errors == ["2.000e-07", "1.000004e-07", "1.000e-07", "3.210e-12"]
+    assert error_beside(1.235e-7, 1.2351e-7) == "1.2351e-07"  # three digits are on its side, four are not
 
 
 def test_more_digits_are_on_the_side_of_a_limit_too() -> None:
