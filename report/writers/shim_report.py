@@ -56,10 +56,10 @@ def write(directory: Path) -> Path:
             ends = [
                 (patches["patch"][at[1]], ", other end" * (at[0] != sizes[0])) for at in thicknesses.columns
             ]
-            whole_joints = pd.DataFrame(joints)
+            lines = pd.DataFrame(joints)
             names = ("".join(end) for end in ends)
-            thicknesses.columns = pd.Index([f"{name}, mm" if name in whole_joints else name for name in names])
-            files["joints"] = whole_joints.join(thicknesses, on="joint")
+            thicknesses.columns = pd.Index([f"{name}, mm" if name in lines else name for name in names])
+            files["joints"] = lines.join(thicknesses, on="joint")
             blocks += _stock(table.join(patches["area_mm2"], on="patch"), sizes)
         shims = patches[patches["thickness_mm"] > 0]
         ranges = [Column(f"{axis}, mm", partial(_range, axis)) for axis in "xy"]
