@@ -9,7 +9,6 @@ import pytest
 import scipy.sparse as sp
 
 from harness import own_matrices
-from harness.commands import plain_arrays
 from harness.planning import form_choice
 from harness.planning.form_choice import chosen_form, refuse_what_cannot_fit, size_of
 from harness.scene import validate
@@ -55,8 +54,7 @@ def test_a_dense_matrix_in_sparse_storage_is_taken_for_a_dense_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It was solved in the sparse form, which refuses it."""
-    for module in (user_matrices, plain_arrays):
-        monkeypatch.setattr(module, "SMALL", 10)
+    monkeypatch.setattr(user_matrices, "SMALL", 10)
     monkeypatch.setattr(form_choice, "SMALL_MIB", 0.0)
     K, A = sp.csc_array(12 * np.eye(12) + 1), sp.csc_array(np.eye(12, 1))
     given: dict[str, Any] = {"K": K, "A": A, "f": np.ones(12), "g": np.ones(1)}
