@@ -15,11 +15,11 @@ from rich.console import Console
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from harness.results import records
-from harness.results.provenance import installed_version
 from harness.results.records import Row
 from harness.results.row_validation import PROBLEM, refuse_wrong_kinds
 from harness.solving.solver_answer import shown
 from harness.solving.solver_session import OTHER_NAME, replaced
+from harness.solving.solver_version import version_of
 from harness.verification.reference_problem import PROBLEMS
 from problems.errors import Fault, InputError, read_all
 from problems.forms import FORMS
@@ -29,7 +29,7 @@ from problems.storage import ROOT, fingerprint
 from report.document.numbers import counted
 from solvers.base import Form, Solver
 from solvers.plugin import plugin_files
-from solvers.registry import make_solver, owner_of, solver_version
+from solvers.registry import make_solver, owner_of
 
 from .child_process import Events
 from .environments import interpreter, refuse_other_copies
@@ -141,14 +141,6 @@ def described_here(
         return Description(list(forms), version_of(name, solver, plugin), code_of(solver), owner_of(name))
 
     return read_all(describe_one, solvers)
-
-
-def version_of(name: str, solver: Solver, plugin: Path | None) -> str:
-    """The version of a solver; of a plug-in that of its files, and of the distribution that it names."""
-    version = solver_version(name, plugin)
-    if plugin is None or plugin.stem != name or not solver.distribution:
-        return version
-    return f"{version} {solver.distribution}=={installed_version(solver.distribution)}"
 
 
 def code_of(solver: Solver) -> str:

@@ -12,6 +12,7 @@ from harness.results import records
 from harness.results.provenance import installed_version, machine, provenance
 from harness.results.records import Row
 from harness.results.schema import MEASURED, STEPS, MeasurementRow, Origin, Provenance
+from harness.solving.solver_version import CHANGED, refuse_other_version
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
@@ -22,8 +23,6 @@ from report.document.numbers import upwards
 
 from .solver_descriptions import Description
 from .worker import FinishedReport, measure, scene_to_measure
-
-AS_READ = "the file that the run has read: it has changed since, or is another on this worker"
 
 
 @dataclass(frozen=True)
@@ -55,21 +54,20 @@ class TaskResult:
 def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into the directory `answers`.
 
-    Raises InputError if the file of the scene is another than that on which they are judged, or that of the
-    plug-in another than that whose version the rows have.
+    Raises InputError if the file of the scene is another than that on which they are judged, or the solver
+    has another version than the rows would have.
     """
     first = task.batch[0]
     if task.scene_key and read_scene(first.source).key != task.scene_key:
-        raise InputError.one(first.source, "scene", "another", AS_READ)
+        raise InputError.one(first.source, "scene", "another", f"the file that the run has read: {CHANGED}")
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[FinishedReport]
     if task.solver.failure:
         reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
     elif first.form in forms:
         reports = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
-        version, described = reports[0].get("plugin_version"), task.solver.version.partition(" ")[0]
-        if version not in (None, described) and not first.entry.requirements:
-            raise InputError.one(first.suite.plugin, "plugin", "another", AS_READ)
+        if "version" in reports[0] and not first.entry.requirements:
+            refuse_other_version(first.solver, first.suite.plugin, reports[0]["version"], task.solver.version)
     else:
         reports = [{"status": "unsupported", "message": f"takes {' and '.join(forms)} only"}] * len(batch)
     return TaskResult(reports, time.monotonic() - start)

@@ -22,6 +22,7 @@ from harness.results.records import Row, replace_arrays
 from harness.results.schema import Report
 from harness.solving.solver_answer import InvalidAnswer, figures
 from harness.solving.solver_session import SolverSession, copied, given_arrays
+from harness.solving.solver_version import version_of
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
@@ -29,7 +30,7 @@ from problems.model.scene import Scene
 from problems.reporter import Reporter
 from problems.scene_files import read_scene
 from solvers.base import Answer
-from solvers.registry import make_solver, solver_version
+from solvers.registry import make_solver
 
 from .child_process import Events
 from .environments import interpreter
@@ -48,12 +49,12 @@ class FinishedReport(Report, total=False):
     """A report at its end.
 
     cannot_save : why the answer's file cannot be written, which ends the run. With the first measurement of a
-    process: printed, what it printed; plugin_version, that of the plug-in's file when the process read it.
+    process: printed, what it printed; version, that of the solver in that process.
     """
 
     cannot_save: str
     printed: str
-    plugin_version: str
+    version: str
 
 
 class Unsupported(InvalidAnswer):
@@ -117,8 +118,7 @@ class Run(Reporter):
         m, files = self.first, self.answers
         plugin = Path(m.suite.plugin) if m.suite.plugin else None
         solver = make_solver(m.solver, m.entry.options, plugin)
-        if plugin and plugin.stem == m.solver:  # after its import, which may add folders of code
-            self.events.report(plugin_version=solver_version(m.solver, plugin))
+        self.events.report(version=version_of(m.solver, solver, plugin))
         own = {"time_limit_s": OWN_LIMIT * m.time_limit_s, "iteration_limit": m.iteration_limit}
         vars(solver).update(own, prints=True)  # it may be frozen
         if m.form not in solver.forms:

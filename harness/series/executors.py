@@ -19,11 +19,12 @@ from harness.measurement.worker import START_S
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.solving.call_lock import in_turn
+from harness.solving.solver_version import refuse_other_version, version_of
 from harness.terminal.console import ConsoleReporter
 from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError
-from solvers.registry import make_solver, solver_version
+from solvers.registry import make_solver
 
 from .session import BLOCK, Job, Result, SeriesSession
 from .staged import StagedSession, session_of
@@ -100,7 +101,10 @@ def solve_here(task: tuple[Job, Sequence[int], bool], events: Events) -> None:
     """Solve the cases of a task in the child process; each result is an event."""
     job, numbers, batched = task
     solver = make_solver(job.solver, job.solver_options, job.plugin)
-    refuse_other_files(job)  # after its import, which may add folders of code
+    refuse_other_matrices(job)
+    if job.plugin_version:  # after its import, which may add folders of code
+        version = version_of(job.solver, solver, job.plugin)
+        refuse_other_version(job.solver, job.plugin, version, job.plugin_version)
     session = SeriesSession(job, solver, events.report, batched)
     for some in session.solve(numbers):
         for result in some:
@@ -122,15 +126,11 @@ def ended(job: Job, case: int, end: Row) -> Row:
     }
 
 
-def refuse_other_files(job: Job) -> None:
-    """Raise InputError if the files of matrices or the plug-in are others than those at the beginning."""
+def refuse_other_matrices(job: Job) -> None:
+    """Raise InputError if the files of matrices are others than those at the beginning."""
     if job.scene_key and job.scene.key != job.scene_key:
         allowed = "those that the series has read: they have changed since, or are others on this worker"
         raise InputError.one(job.scene.source_of("K"), "matrices", "others", allowed)
-    described = job.plugin_version.partition(" ")[0]  # the rest is the version of a distribution
-    if job.plugin and described not in ("", solver_version(job.solver, job.plugin)):
-        allowed = "that which the series has read: it has changed since, or is another on this worker"
-        raise InputError.one(job.plugin, "plugin", "another", allowed)
 
 
 @in_turn
@@ -140,7 +140,7 @@ def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
     if job.plugin:
         return [result for some in solve_isolated(job, numbers) for result in some]
     if job.key not in _sessions:
-        refuse_other_files(job)
+        refuse_other_matrices(job)
         _sessions.clear()
         _sessions[job.key] = session_of(job)
     session = _sessions[job.key]

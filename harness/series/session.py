@@ -91,8 +91,8 @@ class SeriesOptions:
 class Job(SeriesOptions):
     """The cases of a series, and how they are solved.
 
-    threads : None: as they are. scene_key, plugin_version : those of the scene and of the plug-in's file at
-    the beginning; "": not told.
+    threads : None: as they are. scene_key, plugin_version : those of the scene and of the plug-in at the
+    beginning; "": not told.
     """
 
     scene: Scene

@@ -224,7 +224,14 @@ def test_another_plug_in_than_the_one_described_is_refused(folder: Path) -> None
     asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
     m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
     task = Task([m], Description(["dual"], "sha256:of another", "code"))
-    with pytest.raises(InputError, match=r"exact\.py: plugin = 'another': the file that the run has read"):
+    with pytest.raises(InputError, match=r"exact\.py: version = 'sha256:\w+': sha256:of another, as at"):
+        run_task(task, folder)
+
+
+def test_another_version_of_a_solver_than_the_one_described_is_refused(folder: Path) -> None:
+    """A worker has another one installed: its row would have the version of the driver's."""
+    task = Task([measurement(folder)], Description(["dual"], "0.0.1", "code"))
+    with pytest.raises(InputError, match=r"solver gi: version = '.+': 0\.0\.1, as at the beginning"):
         run_task(task, folder)
 
 

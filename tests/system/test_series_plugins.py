@@ -18,6 +18,7 @@ from harness.series.executors import solve_isolated
 from harness.series.session import Job
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
+from solvers.registry import solver_version
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
 
@@ -105,12 +106,15 @@ def test_matrices_in_memory_are_not_sent_to_a_plug_in(tmp_path: Path) -> None:
         run_series(scene, tmp_path / "out", cases, options)
 
 
-def test_another_plug_in_than_the_one_described_is_refused(tmp_path: Path) -> None:
-    """It was edited meanwhile, or is older on a worker: a series is of one solver."""
-    scene = read_scene(str(write_strip(tmp_path)))
-    plugin: Any = {"solver": "mine", "plugin": write(tmp_path), "plugin_version": "sha256:of another"}
+@pytest.mark.parametrize("described", ["sha256:of another numpy=={numpy}", "{files} numpy==0.1"])
+def test_another_plug_in_than_the_one_described_is_refused(tmp_path: Path, described: str) -> None:
+    """It was edited meanwhile, or is older on a worker, as its library may be: a series is of one solver."""
+    scene, path = read_scene(str(write_strip(tmp_path))), write(tmp_path)
+    path.write_text(path.read_text() + '\n    distribution = "numpy"\n')
+    version = described.format(files=solver_version("mine", path), numpy=np.__version__)
+    plugin: Any = {"solver": "mine", "plugin": path, "plugin_version": version}
     job = Job(**plugin, scene=scene, cases=random_gaps(scene, 2, 0), form="dual", check=0, threads=1)
-    with pytest.raises(InputError, match=r"mine\.py: plugin = 'another': that which the series has read"):
+    with pytest.raises(InputError, match=rf"mine\.py: version = .*: {version}, as at the beginning"):
         list(solve_isolated(job, [0, 1]))
 
 
