@@ -24,13 +24,15 @@ def record_suite(
 ) -> None:
     """Write suite.toml; with a key, only into a directory that has neither one nor rows.
 
-    Raises InputError if the directory has the row of the key, or if another suite.toml there plans rows that
-    are still to be made and that `plan` lacks: nobody would miss them any more.
+    Raises InputError if the directory has the row of the key, or a damaged suite.toml; or if that plans rows
+    that are still to be made and that `plan` lacks: nobody would miss them any more.
     """
     path, text = directory / SUITE, to_toml(suite)
     if key is not None:
         if any(row["key"] == key for row in rows):
             raise InputError.one("--key", "key", key, f"{directory} has its row: {OTHER}")
+        if path.exists():
+            read_written(path)  # the report reads it once the row is there
         if rows or path.exists():
             return
     elif other_suite(directory, suite):

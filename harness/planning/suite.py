@@ -44,6 +44,7 @@ FORMER = ("stop_at_times_fastest",)
 SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
 FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # no control characters, no slashes
+FOLDER_NAME = r"^\.*[^\x00-\x1f\x7f/\\.][^\x00-\x1f\x7f/\\]*$"  # nor dots alone: another folder
 Auto = Annotated[Literal["auto"], Tag(WORD)]
 Repeats = Annotated[Annotated[int, Field(ge=1, le=1000), PLAIN, Tag(VALUE)] | Auto, Discriminator(is_word)]
 Tolerances = Annotated[Annotated[list[Positive], NonEmpty, Tag(VALUE)] | Auto, Discriminator(is_word)]
@@ -129,7 +130,7 @@ class Suite(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: Annotated[str, Field(min_length=1, max_length=60, pattern=FILE_NAME)]
+    name: Annotated[str, Field(min_length=1, max_length=60, pattern=FOLDER_NAME)]
     title: str = ""
     description: str = ""
     scenes: Annotated[list[str], NonEmpty]

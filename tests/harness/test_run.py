@@ -211,6 +211,16 @@ def test_a_row_measured_again_leaves_the_directory_as_it_is(copy: Path) -> None:
     assert (copy / "suite.toml").read_bytes() == suite
 
 
+def test_no_row_is_measured_beside_a_damaged_suite(copy: Path, folder: Path) -> None:
+    """Its report could not be written."""
+    rows = [row for row in rows_of(copy) if row["key"] != KEY]
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    (copy / "suite.toml").write_text("solver = [3")
+    told = wrong_usage("run", folder / "small.toml", "--key", KEY, "--out", copy)
+    assert str(copy / "suite.toml") in told
+    assert rows_of(copy) == rows
+
+
 def test_gate_believes_the_answers_and_not_the_rows(copy: Path) -> None:
     rows = rows_of(copy)
     for row in rows:

@@ -141,6 +141,13 @@ def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
     assert "'primal', 'dual' or 'sparse'" in faults["solver.1.forms.0"].allowed
 
 
+@pytest.mark.parametrize("name", ["..", ".", "...", "", "a/b", "/tmp/a", "a\\b"])
+def test_the_name_of_a_suite_is_that_of_a_folder(tmp_path: Path, name: str) -> None:
+    """`run` writes into results/NAME: with '..' it wrote into the current folder."""
+    refused = refusal_of(read_suite, str(tiny_joint.write_suite(tmp_path, name=name)))
+    assert [fault.key for fault in refused.faults] == ["name"]
+
+
 def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> None:
     text = '[[solver]]\nname = "gi"\n[[solver]]\nname = "gi"\noptions = {a = 1}\n'
     with pytest.raises(InputError, match=r"solver\.1\.variant"):
