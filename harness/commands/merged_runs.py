@@ -9,7 +9,7 @@ from harness.measurement.recorded_suite import SUITE
 from harness.measurement.suite_run import record_machine
 from harness.planning.suite import read_written
 from harness.results import records
-from harness.results.comparison import Incomparable, read_rows, refuse_incomparable
+from harness.results.comparison import Incomparable, Side, read_rows, refuse_incomparable
 from harness.results.row_validation import refuse_unreadable
 from harness.verification.reference_problem import PROBLEMS
 from problems.errors import InputError, read_all
@@ -23,8 +23,10 @@ def merge(names: Sequence[str], out: Path) -> Path:
     Answers stay where they are. Raises InputError; Incomparable if a machine made a measurement in two runs.
     """
     sides = read_all(read_rows, names)
+    before = sides[0]
     for side in sides[1:]:
-        refuse_incomparable(sides[0], side)
+        refuse_incomparable(before, side)
+        before = Side(f"{before.name} and {side.name}", before.rows + side.rows)
     older = [row for name in names for row in records.read(Path(name) / records.OUTDATED)]
     for folder in map(Path, names):  # before anything is written
         refuse_unreadable(folder)

@@ -156,3 +156,11 @@ def test_runs_that_do_not_belong_together_are_refused(both: tuple[Path, Path], t
     assert "another limit" in harness("merge", fast, other, "--out", out).stderr
     assert harness("merge", fast, slow, "--out", fast).exit_code == 2
     assert harness("merge", fast, tmp_path / "none", "--out", out).exit_code == 2
+
+
+def test_a_run_is_held_against_all_before_it(both: tuple[Path, Path], tmp_path: Path) -> None:
+    """It shares with the second what the first does not have."""
+    third = machine(tmp_path / "third", "A third", 1.0, row(LOW, "slow", key="slow", limit_mm=1e-3))
+    done = harness("merge", *both, third, "--out", tmp_path / "out")
+    assert (done.exit_code, (tmp_path / "out").exists()) == (5, False)
+    assert f"another limit than in {both[0]} and {both[1]}: 1e-07 mm" in " ".join(done.stderr.split())
