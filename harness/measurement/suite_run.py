@@ -157,7 +157,6 @@ class Measuring:
     def tasks(self, remaining: list[Measurement]) -> Iterator[tuple[Pending, Task] | None]:
         """One task after another; a scene is opened before its first task of a family of forms."""
         opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
-        keys: dict[str, str] = {}  # of its files, before they are opened: they may change meanwhile
         made = set[str]()  # the forms whose matrices are made
         for batch in self.due(remaining):
             if batch is None:
@@ -169,15 +168,15 @@ class Measuring:
             family = form_family(m.form)
             if family not in opened:
                 with self.display.step(m.scene):
-                    scene = read_scene(m.source)
-                    keys[family] = scene.key if scene.sources else ""
-                    opened[family] = measurable(scene, self.display, m.suite.reference_limit_s, m.form)
+                    limit_s = m.suite.reference_limit_s
+                    opened[family] = measurable(m.source, self.display, limit_s, m.form)
             problem = opened[family]
             if m.form not in made:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            task = Task(batch, self.solvers[m.solver, m.entry.label], keys[family])
+            key = problem.scene_key if problem.scene.sources else ""
+            task = Task(batch, self.solvers[m.solver, m.entry.label], key)
             self.running[m.key] = m
             yield (task, problem), task
 

@@ -58,8 +58,7 @@ def run_task(task: Task, answers: Path) -> TaskResult:
     has another version than the rows would have.
     """
     first = task.batch[0]
-    if task.scene_key and read_scene(first.source).key != task.scene_key:
-        raise InputError.one(first.source, "scene", "another", f"the file that the run has read: {CHANGED}")
+    refuse_other_scene(task)
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[FinishedReport]
     if task.solver.failure:
@@ -70,7 +69,16 @@ def run_task(task: Task, answers: Path) -> TaskResult:
             refuse_other_version(first.solver, first.suite.plugin, reports[0]["version"], task.solver.version)
     else:
         reports = [{"status": "unsupported", "message": f"takes {' and '.join(forms)} only"}] * len(batch)
-    return TaskResult(reports, time.monotonic() - start)
+    elapsed_s = time.monotonic() - start
+    refuse_other_scene(task)  # perhaps it has changed before the process read it
+    return TaskResult(reports, elapsed_s)
+
+
+def refuse_other_scene(task: Task) -> None:
+    """Raise InputError if the file of the scene is another than that on which the answers are judged."""
+    source = task.batch[0].source
+    if task.scene_key and read_scene(source).key != task.scene_key:
+        raise InputError.one(source, "scene", "another", f"the file that the run has read: {CHANGED}")
 
 
 def run_task_on_worker(task: Task) -> TaskResult:
@@ -157,7 +165,7 @@ def _row(
         "time_limit_s": m.time_limit_s,
         "memory_limit_mib": m.suite.memory_limit_mib,
         **origin,
-        "scene_key": problem.scene.key,
+        "scene_key": problem.scene_key,
         "solver_version": solver.version,
         "solver_code": solver.code,
         "rivetbench_version": installed_version("rivetbench"),

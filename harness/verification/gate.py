@@ -222,7 +222,7 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
     if not row.get("answer"):
         why = f"{row['status']}: {row.get('message') or 'no answer'}".splitlines()[0]
         return Finding(row["key"], Judgement("no_answer", bound), limit, why)
-    if row["scene_key"] != problem.scene.key:
+    if row["scene_key"] != problem.scene_key:
         why = "the scene has changed since it was measured: run again"
         return Finding(row["key"], Judgement("cannot_be_judged", bound), limit, why)
     judgement = problem.judge_file(directory / row["answer"], limit)

@@ -38,7 +38,7 @@ class ReferenceProblem:
     limit_s : after it no further candidate for the reference is tried. case : the number of the load case in
     a series; None for the scene's own. first : candidates that are tried before the in-house methods.
     locks_proven : whether the answers of earlier stages, in which fasteners lock, are proven; if not, nor is
-    the reference.
+    the reference. scene_key : that of the scene before its files were read, from `measurable` alone.
     """
 
     scene: Scene
@@ -49,6 +49,7 @@ class ReferenceProblem:
     case: int | None = None
     first: list[Candidate] = field(default_factory=list)
     locks_proven: bool = True
+    scene_key: str = ""
 
     @cached_property
     def reference(self) -> Reference:
@@ -181,7 +182,9 @@ def measurable(
     """Open or build a scene, or that of a name or path, that a solver can be measured on. Raises InputError,
     also if K is not positive definite.
     """
-    problem = open_problem(read_scene(source) if isinstance(source, str) else source, form, reporter, limit_s)
+    scene = read_scene(source) if isinstance(source, str) else source
+    key = scene.key  # its files may change when they have been read
+    problem = replace(open_problem(scene, form, reporter, limit_s), scene_key=key)
     refuse_without_contacts(problem.prepared, problem.scene.source_of("A"))
     reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()
@@ -212,7 +215,7 @@ def record(problem: ReferenceProblem, directory: Path, machine: str) -> None:
     row: dict[str, Any] = {
         "scene": scene.name,
         "title": scene.title,
-        "scene_key": scene.key,
+        "scene_key": problem.scene_key,
         "machine": machine,
         "n": assembly.junction_size,
         "m": assembly.m,
@@ -224,7 +227,7 @@ def record(problem: ReferenceProblem, directory: Path, machine: str) -> None:
         row |= {"printed_objective": printed.value, "printed_digits": printed.digits}
         row["printed_source"] = printed.source
     same = [each for each in records.read(directory / PROBLEMS) if each["scene"] == scene.name]
-    recorded = {each.get("machine"): each for each in same if each.get("scene_key") == scene.key}
+    recorded = {each.get("machine"): each for each in same if each.get("scene_key") == problem.scene_key}
     earlier = recorded.get(machine) or recorded.get(None)
     sparse = earlier.get("sparse", {}) if earlier else {}
     if problem.form == "sparse":

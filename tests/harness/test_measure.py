@@ -18,6 +18,7 @@ from harness.measurement.worker import FinishedReport, measure
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from problems.errors import InputError
+from problems.scene_files import read_scene
 
 pytestmark = pytest.mark.slow
 starts = pytest.mark.starts
@@ -206,6 +207,20 @@ def test_another_scene_than_that_of_the_reference_is_refused(folder: Path) -> No
         run_task(task, folder)
     with pytest.raises(InputError, match="the file that the run has read"):
         run_task_on_worker(task)
+
+
+def test_a_scene_that_changes_before_its_process_reads_it_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def changing(*of: Any) -> list[FinishedReport]:
+        tiny_joint.write_problem(tmp_path / "tiny.npz", shift=1.0)
+        return [{"status": "solved"}]
+
+    tiny_joint.write_problem(tmp_path / "tiny.npz")
+    m = measurement(tmp_path)
+    monkeypatch.setattr("harness.measurement.task.measure", changing)
+    with pytest.raises(InputError, match="it has changed since"):
+        run_task(Task([m], Description(["dual"], "1", "code"), read_scene(m.source).key), tmp_path)
 
 
 def test_a_scene_without_files_is_not_made_again_to_be_compared(

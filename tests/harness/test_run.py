@@ -19,6 +19,7 @@ from refusals import refusal_of
 from rich.console import Console
 from suite_runs import gated, is_alive, moved, rows_of, said_by, wait_for
 
+from harness.measurement import task
 from harness.measurement.solver_descriptions import Description, resumed
 from harness.measurement.suite_run import run
 from harness.planning.plan import expand, of_key
@@ -26,6 +27,7 @@ from harness.planning.suite import read_suite, read_written
 from harness.results import records
 from harness.results.records import Row
 from harness.verification.reference_problem import ReferenceProblem, measurable
+from problems.scene_files import read_scene
 from studies.smaller_results import pack
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
@@ -344,6 +346,23 @@ def test_a_scene_whose_file_changes_when_it_has_been_opened_ends_the_run(
 
     monkeypatch.setattr("harness.measurement.suite_run.measurable", changing)
     assert "it has changed since" in wrong_usage("run", suite, "--out", tmp_path / "out")
+
+
+def test_a_row_has_the_key_of_the_scene_that_was_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not that of the file when it is written, for which the next run would keep it."""
+    suite = tiny_joint.write_suite(tmp_path / "own")
+    key = read_scene(str(tmp_path / "own" / "tiny.npz")).key
+
+    def changing(*of: Any) -> list[Row]:
+        tiny_joint.write_problem(tmp_path / "own" / "tiny.npz", shift=1.0)
+        return task.rows_of(*of)
+
+    monkeypatch.setattr("harness.measurement.suite_run.rows_of", changing)
+    assert said_by(run, read_suite(str(suite)), tmp_path / "out")[0] == 0
+    rows = [*rows_of(tmp_path / "out"), *records.read(tmp_path / "out" / "problems.jsonl")]
+    assert [row["scene_key"] for row in rows] == [key, key]
 
 
 def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path) -> None:
