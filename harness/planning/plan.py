@@ -156,11 +156,12 @@ def _guides(suite: Suite, scenes: Sequence[Scene]) -> dict[str, tuple[str, float
     """The guide of each scene in a suite with `times_best_form`.
 
     The first scene of a size is guided by the first of the next smaller size; any other scene by the first of
-    its size, where the form must have been the best, and quick.
+    its size, where the form must have been the best, and quick. Own matrices, whose size is not known here,
+    neither guide nor are guided.
     """
-    sizes = {scene.name: (scene.expected_size or (0, 0))[0] for scene in scenes}
-    first = {sizes[scene.name]: scene.name for scene in reversed(scenes)}
-    guides: dict[str, tuple[str, float, float] | None] = dict.fromkeys(sizes)
+    sizes = {scene.name: expected[0] for scene in scenes if (expected := scene.expected_size)}
+    first = {n: name for name, n in reversed(sizes.items())}
+    guides: dict[str, tuple[str, float, float] | None] = {scene.name: None for scene in scenes}
     for name, n in sizes.items() if suite.times_best_form else ():
         smaller = max((size for size in first if size < n), default=None)
         if name != first[n]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import tiny_joint
 
 from harness.measurement.solver_descriptions import Description, outdated
 from harness.planning.plan import expand
@@ -63,6 +64,13 @@ def test_the_fastest_answer_within_the_limit_counts_and_ours_are_measured_in_all
     assert forms("4386/1471", [*rows, row("4386/0107", "sparse", 0.5, verdict="outside")]) == {"dual"}
     assert forms("4386/1471", [each | {"owner": "ours"} for each in rows]) == ALL
     assert {m.guide for m in plan(times_best_form=None)} == {None}
+
+
+def test_own_matrices_neither_guide_nor_are_guided(tmp_path):
+    """They all counted as the smallest size, and as one."""
+    own = [str(tiny_joint.write_problem(tmp_path / f"{name}.npz")) for name in "ab"]
+    guides = {m.scene: m.guide for m in plan(scenes=[*own, "4386/0107"])}
+    assert guides == dict.fromkeys(("a", "b", "4386/0107"))
 
 
 def test_limits_go_by_size():
