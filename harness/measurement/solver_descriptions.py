@@ -210,7 +210,7 @@ def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> b
     """Whether a row has to be measured again.
 
     It is of another scene, series, solver or accuracy, hit a limit that is wider now, or has the status
-    `not_run` of older versions.
+    `not_run` of older versions; or a search tried what is asked for now: reports keep one row of a search.
     """
     current = {
         "scene_key": scene_key,
@@ -224,4 +224,5 @@ def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> b
     changed = law != recorded_law or any(row.get(name) != value for name, value in current.items())
     out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.suite.memory_limit_mib
-    return changed or out_of_time or out_of_memory or row["status"] == "not_run"
+    tried = bool(row.get("searched")) and not m.searched
+    return changed or tried or out_of_time or out_of_memory or row["status"] == "not_run"

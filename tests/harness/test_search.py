@@ -233,6 +233,15 @@ def test_a_search_does_not_try_again_what_its_workers_did_not_survive(
     assert f"tol={START:g}" in key
 
 
+def test_a_tolerance_that_was_only_tried_is_measured_where_it_is_asked_for(tmp_path: Path) -> None:
+    """The gate missed it, as it keeps one row of a search, and the same command did not measure it."""
+    suite, out = suite_of(tmp_path, LOOSE), tmp_path / "out"
+    tried = measured(suite, out)[0]["tolerance"]
+    rows = measured(overridden(suite, Overrides(tolerances=(tried,))), out)
+    assert [row["searched"] for row in rows if row["tolerance"] == tried] == [False]
+    assert not [finding for finding in gate(out).findings if "never measured" in finding.why]
+
+
 def test_a_row_is_waited_for_where_it_decides(tmp_path: Path) -> None:
     """Of a search its own in the form, of a form that may be left out those of the guide in any."""
     searched = expand(suite_of(tmp_path, repeats=2))
