@@ -60,7 +60,7 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] = FORMS) -> 
     Raises
     ------
     InputError
-        If `forms` is a text.
+        If `forms` is a text, or names what is no form.
     SystemExit
         If the solver ends the process.
 
@@ -76,6 +76,8 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] = FORMS) -> 
     []
     """
     refuse_text("check_solver", forms=forms)
+    if unknown := [form for form in forms if form not in FORMS]:
+        raise InputError.one("check_solver", "forms", unknown, f"some of {', '.join(FORMS)}")
     return first_of_each(findings(solver_factory, forms))
 
 

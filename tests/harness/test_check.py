@@ -9,6 +9,7 @@ import pytest
 
 from harness.conformance.check import run
 from harness.conformance.known_problems import known_problems
+from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 from solvers.registry import make_solver
@@ -189,6 +190,13 @@ def test_an_error_within_a_library_is_named_with_the_line_that_calls_it() -> Non
     words = words_of(Raises, ("dual",))
     assert "setup: raised LinAlgError" in words
     assert "test_check.py, line" in words
+
+
+def test_a_form_that_there_is_not_is_refused() -> None:
+    """In no form, every solver was sound."""
+    forms: Any = ("daul",)
+    with pytest.raises(InputError, match=r"check_solver: forms = \['daul'\]: some of"):
+        run(Sound, forms)
 
 
 def test_wrong_forms_and_a_failing_constructor() -> None:
