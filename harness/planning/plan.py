@@ -148,6 +148,8 @@ def expand(suite: Suite) -> list[Measurement]:
             plan.setdefault(m.key, m)
     if not plan:
         allowed = f"no solver is meant for these: { ({entry.name: entry.scenes for entry in suite.solver}) }"
+        if not scenes:
+            allowed = "rungs that a model should refuse are not measured, and there are no other scenes"
         raise InputError.one(suite.name, "scenes", suite.scenes, allowed)
     return list(plan.values())
 

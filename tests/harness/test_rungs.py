@@ -50,6 +50,12 @@ def test_a_refused_rung_is_recorded_and_not_measured(directory: Path, suite: Sui
     assert "refused" not in problems[WIDE]
 
 
+def test_refused_rungs_alone_are_nothing_to_measure(suite: Suite) -> None:
+    """The message had named the solvers as the cause."""
+    with pytest.raises(InputError, match="there are no other scenes"):
+        expand(suite.model_copy(update={"scenes": [REFUSED]}))
+
+
 @pytest.mark.parametrize(("share", "code"), [(0.9, 0), (1.1, 1)])
 def test_the_gate_finds_the_limit_itself(directory: Path, share: float, code: int, tmp_path: Path) -> None:
     copy = Path(shutil.copytree(directory, tmp_path / "copy"))
