@@ -5,7 +5,6 @@ import random
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from hashlib import sha256
 from itertools import product
@@ -140,7 +139,7 @@ def expand(suite: Suite) -> list[Measurement]:
     plan: dict[str, Measurement] = {}
     guides = _guides(suite, list(scenes.values()))
     for source, scene in scenes.items():
-        entries = [entry for entry in suite.solver if _applies(entry, scene.name, source)]
+        entries = [entry for entry in suite.solver if entry.takes(scene.name, source)]
         measurements = [
             replace(m, guide=guides[scene.name]) for e in entries for m in _of_entry(suite, e, scene, source)
         ]
@@ -193,7 +192,7 @@ def _of_entry(suite: Suite, entry: SolverEntry, scene: Scene, source: str) -> It
 def round_beside(m: Measurement, time: str) -> list[Measurement]:
     """The suite's entries with `beside` on m's scene, to be measured in a round that begins at a time."""
     scene = read_scene(m.source)
-    entries = (e for e in m.suite.solver if e.beside and _applies(e, scene.name, m.source))
+    entries = (e for e in m.suite.solver if e.beside and e.takes(scene.name, m.source))
     of_scene = (measurement for e in entries for measurement in _of_entry(m.suite, e, scene, m.source))
     return [
         replace(measurement, round=time)
@@ -206,10 +205,6 @@ def _round_and_place(m: Measurement) -> tuple[int, float]:
     """The round of a measurement, and a random place in it, where the first round keeps the suite's order."""
     words = f"{m.scene} {m.repeat} {m.solver} {m.form} {m.variant} {m.threads}"
     return m.repeat, random.Random(words).random() if m.repeat else 0.0
-
-
-def _applies(entry: SolverEntry, name: str, source: str) -> bool:
-    return entry.scenes is None or any(fnmatchcase(name, glob) or glob == source for glob in entry.scenes)
 
 
 def with_key(suite: Suite, key: str) -> Suite:

@@ -99,6 +99,10 @@ class SolverEntry(BaseModel):
         """The variant and the version, which distinguish the rows of the solver's entries."""
         return f"{self.variant} {self.version}".strip()
 
+    def takes(self, name: str, source: str) -> bool:
+        """Whether it is measured on a scene of the suite, by its own `scenes`."""
+        return self.scenes is None or any(fnmatchcase(name, glob) or glob == source for glob in self.scenes)
+
 
 class RandomCases(BaseModel):
     """[series]: each scene with `cases` random initial gaps, solved one after another in one process.
@@ -170,7 +174,7 @@ def read_suite(name_or_path: str) -> Suite:
         if not path.is_file():
             raise InputError.one("SUITE", "name", name_or_path, unknown("suite", name_or_path, suite_names()))
     suite = suite_from(read_toml(path), path)
-    if faults := _overlapping(suite, path):
+    if faults := [*_elsewhere(suite, path), *_overlapping(suite, path)]:
         raise InputError(faults)
     return suite
 
@@ -183,6 +187,9 @@ def suite_from(data: dict[str, Any], path: Path) -> Suite:
         data["scenes"] = resolved_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
     if isinstance(data.get("plugin"), str):
         data["plugin"] = str(resolved(path.parent / data["plugin"]))
+    for entry in _entries(data):
+        if isinstance(scenes := entry.get("scenes"), list):
+            entry["scenes"] = [str(resolved(path.parent / s)) if _is_file(s) else s for s in scenes]
     faults += _unknown_solvers(data, path)
     return validated(data, path, faults)
 
@@ -211,7 +218,7 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
     """
     scenes: dict[str, None] = {}
     for pattern in map(str, patterns):
-        if Path(pattern).suffix in (".toml", ".npz"):
+        if _is_file(pattern):
             path = resolved(base / pattern)
             if not path.is_file():
                 faults.append(Fault(where, key, pattern, "no such file"))
@@ -226,9 +233,19 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
     return list(scenes) or list(map(str, patterns))
 
 
-def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
+def _is_file(scene: object) -> bool:
+    """Whether a scene is given by the path of a file."""
+    return Path(str(scene)).suffix in (".toml", ".npz")
+
+
+def _entries(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """The tables [[solver]]; what is something else is refused when they are validated."""
     entries = data["solver"] if isinstance(data.get("solver"), list) else []
-    names = {k: str(e["name"]) for k, e in enumerate(entries) if isinstance(e, dict) and "name" in e}
+    return [entry if isinstance(entry, dict) else {} for entry in entries]
+
+
+def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
+    names = {k: str(entry["name"]) for k, entry in enumerate(_entries(data)) if "name" in entry}
     solvers = [*modules(), *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
     if not set(names.values()) <= set(solvers):
         solvers += [name for name in solver_names() if name not in solvers]  # slow: imports every library
@@ -252,6 +269,17 @@ def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
         if other := [key for key in setting if first[key] != setting[key]]:
             allowed = f"{entry.name} has other {other[0]} under this variant above; choose another variant"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
+
+
+def _elsewhere(suite: Suite, path: Path) -> Iterator[Fault]:
+    """Scenes of entries that are none of the suite's: there, nothing would be measured."""
+    scenes = [(Path(scene).stem if _is_file(scene) else scene, scene) for scene in suite.scenes]
+    for k, entry in enumerate(suite.solver):
+        for scene in entry.scenes or ():
+            alone = entry.model_copy(update={"scenes": [scene]})
+            if not any(alone.takes(*each) for each in scenes):
+                allowed = "a scene among those of the suite, or a glob of some"
+                yield Fault(str(path), f"solver.{k}.scenes", scene, allowed)
 
 
 def _overlapping(suite: Suite, path: Path) -> list[Fault]:
@@ -285,9 +313,8 @@ def _planned_twice(suite: Suite, one: SolverEntry, other: SolverEntry) -> Iterat
     form = min({*(one.forms or ["dual"])} & {*(other.forms or ["dual"])}, default="")
     threads = min({*(one.threads or suite.threads)} & {*(other.threads or suite.threads)}, default=0)
     for scene in suite.scenes if tolerance and form and threads else ():
-        name = Path(scene).stem if Path(scene).suffix in (".toml", ".npz") else scene
-        globs = [each.scenes or ["*"] for each in (one, other)]
-        if all(any(fnmatchcase(name, glob) or glob == scene for glob in each) for each in globs):
+        name = Path(scene).stem if _is_file(scene) else scene
+        if one.takes(name, scene) and other.takes(name, scene):
             words = [name, one.name, form, *filter(None, [one.label]), f"tol={tolerance}"]
             yield scene, " ".join([*words, f"threads={threads}"])
 

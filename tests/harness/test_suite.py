@@ -169,14 +169,16 @@ ENTRY = '[[solver]]\nname = "exact"\n'
         ("gated = false", "tolerances = [1e-6]", None),
         ("gated = false", 'forms = ["primal"]', None),
         ("gated = false", "threads = [2]", None),
-        ("gated = false", 'scenes = ["4386/*"]', None),
+        ('scenes = ["tiny.npz"]\ngated = false', 'scenes = ["4386/*"]', None),
+        ("", 'scenes = ["tiny.npz", "4386/0..9"]', r"solver\.1\.scenes = '4386/0\.\.9': a scene among those"),
         ("gated = false", 'variant = "other"', None),
     ],
 )
 def test_no_entry_decides_for_another_whether_a_row_is_gated_and_how_long_it_may_take(
     tmp_path: Path, above: str, entry: str, fault: str | None
 ) -> None:
-    path = str(tiny_joint.write_suite(tmp_path, f"{ENTRY}{above}\n{ENTRY}{entry}\n"))
+    scenes = ["tiny.npz", "4386/0107"]
+    path = str(tiny_joint.write_suite(tmp_path, f"{ENTRY}{above}\n{ENTRY}{entry}\n", scenes=scenes))
     if fault is None:
         assert read_suite(path)
         return
