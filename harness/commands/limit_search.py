@@ -120,7 +120,7 @@ def tolerance(
     Raises
     ------
     InputError
-        If an input is wrong, the key changes no gap, or `out` has other series of these values.
+        If an input is wrong, the key changes no gap, or `out` has series of another key or of other cases.
 
     Examples
     --------
@@ -196,6 +196,9 @@ def tolerance(
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
     lock = records.locked(directory, TOLERANCE, outputs=OUTPUTS)
     with lock, shared(scheduler, console_of(reporter)) as address:
+        if (directory / TOLERANCE).exists():
+            earlier = str(records.read_object(directory / TOLERANCE).get("find")).partition("=")[0].strip()
+            records.refuse_other(directory / TOLERANCE, {"key": earlier}, {"key": name})
         first, last = (bounds(value, None)[1] for value in (values[0], values[-1]))
         if np.array_equal(first, last, equal_nan=True) and np.isfinite(first).any():
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")

@@ -156,12 +156,13 @@ def run_series(
     if read.stages and alien:
         where = "--sweep, --plugin"
         raise InputError.one(where, "given", ", ".join(alien), f"left out: {read.name} has stages")
-    count = swept(read, sweep).count if sweep else cases.count or RANDOM * (cases.contributors or 1)
+    steps = swept(read, sweep) if sweep else None
+    count = steps.count if steps else cases.count or RANDOM * (cases.contributors or 1)
     choice = chosen_form(read, made.forms, wanted, count)
     if choice.why:
         reporter.say(f"In the sparse form, without condensation: {choice.why}")
     chosen: LoadCases = (
-        swept(read, sweep, choice.form) if sweep else cases.of(read, choice.form, stiffness=True)
+        replace(steps, form=choice.form) if steps else cases.of(read, choice.form, stiffness=True)
     )
     for sentence in (*read.unusual, *chosen.notes):
         reporter.say(sentence)

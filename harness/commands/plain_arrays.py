@@ -252,7 +252,8 @@ def solve_series(
     )
     session = SeriesSession(job, chosen)
     if isinstance(cases, LoadCases):
-        next(_copies([cases.load(cases.first)], session.data.assembly))  # refused if made for another form
+        one = (cases.load(k) for k in range(cases.first, cases.first + min(cases.count, 1)))
+        next(_copies(one, session.data.assembly), None)  # refused if made for another form
         return _results(session, [cases])
     copies = _copies(cases, session.data.assembly)
     return _results(session, _blocks(list(copies) if isinstance(cases, Sequence) else copies, session.block))

@@ -36,6 +36,7 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms.prepared import Prepared
 from problems.input.tables import TableOptions
+from problems.load_cases import Listed
 from problems.model.joint import Joint
 from problems.model.joint_model import JointModel
 from solvers.base import failed
@@ -313,6 +314,10 @@ def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
     assert all(array.flags.writeable for load in loads for array in (load.f, load.g))
     with pytest.raises(InputError, match=r"case 1: g\.shape"):
         solve_series(own_matrices(*arrays), [loads[0], LoadCase(loads[1].f, loads[1].g[1:])])
+
+
+def test_a_series_of_no_load_cases_has_no_results() -> None:
+    assert not list(solve_series(own_matrices(*matrices()[2]), Listed(())))
 
 
 def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 from clopper_pearson import interval_of
 from commands import harness, onto, wrong_usage
+from refusals import refusal_of
 from strip_scene import write_strip
 
 from harness.commands import limit_search
@@ -144,6 +145,14 @@ def test_a_range_is_checked_before_its_first_end_is_solved(tmp_path: Path) -> No
     told = wrong_usage("tolerance", write_strip(tmp_path), *words)
     assert f"--find {FORCE}: {FORCE} = 1e+16: must be less than" in told
     assert not (tmp_path / "out").exists()
+
+
+def test_a_directory_holds_the_series_of_one_key(tmp_path: Path) -> None:
+    (tmp_path / "tolerance.json").write_text(json.dumps({"find": f"{FORCE} = 1:600"}))
+    told = refusal_of(tolerance, write_strip(tmp_path), tmp_path, f"{SD}=0.1:0.2", LIMIT)
+    assert [(fault.where, fault.key, fault.value) for fault in told.faults] == [
+        (str(tmp_path / "tolerance.json"), "key", FORCE)
+    ]
 
 
 def test_bisection_finds_the_limit_and_its_interval() -> None:
