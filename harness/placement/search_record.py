@@ -12,7 +12,7 @@ from harness.placement.session import FastenerStudy
 from harness.results.provenance import stamp
 from problems.forms.assembly import Matrix
 from problems.storage import digest
-from report.document.numbers import beside, counted, position, raised
+from report.document.numbers import beside, counted, no_less, position
 
 
 def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
@@ -80,7 +80,7 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
         leave = "leaves" if len(step.plan) == 1 else "leave"
         fasteners = f"{which}{counted(len(step.plan), 'fastener')}"
         gap, limit = step.gap_mm, goal.limit_mm
-        shown = beside(0.0)(raised(gap) or gap) if limit is None else beside(limit)(gap)
+        shown = no_less(gap) if limit is None else beside(limit)(gap)
         words = f"{fasteners} {leave} {shown} mm in the one load case"
     if goal.limit_mm is None:
         return f"{words}, {'' if isfinite(step.gap_mm) else 'not '}proven.", True

@@ -128,6 +128,13 @@ def refuse_unusable(allowed: float | None, scene: Scene) -> None:
     _ = [part.recovery for part, _ in _superelements(scene)]
 
 
+def none_told(scene: JointScene) -> bool:
+    """Whether forces at points act near all elements of all parts; factors no K."""
+    model = model_of(scene)
+    size = model.numbering.size if isinstance(model, JointModel) else scene.joint.size[0]
+    return all(part.near_force.all() for part in stresses_of(scene, np.zeros(size)))
+
+
 def largest_of(
     scene: JointScene, x: Vector, energy: float = 0.0, point_sensitivities: Sequence[Vector] = ()
 ) -> float:

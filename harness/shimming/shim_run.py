@@ -7,8 +7,6 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from harness.measurement.scheduler import workers
 from harness.placement.answer_journal import AnswerJournal, form_of_search
 from harness.placement.candidates import Plan
@@ -20,7 +18,7 @@ from harness.results.atomic_output import refuse_inputs, refuse_unwritable
 from harness.results.provenance import fingerprints, stamp
 from harness.scene.scene_file import add_effect, edited, file_of, opened
 from harness.scene.solution import Source, load_scene
-from harness.scene.stress import largest_of, refuse_unusable
+from harness.scene.stress import none_told, refuse_unusable
 from harness.series.load_case_source import DEFAULT, GapCases
 from harness.solving.call_lock import keeps_threads
 from harness.terminal.console import console_of
@@ -162,7 +160,7 @@ def shim(
     bare = last_scene(read)
     if allow_stress is not None:
         refuse_unusable(allow_stress, bare)
-        if largest_of(bare, np.zeros(bare.joint.size[0])) == inf:  # whatever is between the parts
+        if none_told(bare):  # whatever is between the parts
             allowed = "left out: forces at points act near all elements, so that no stress is told"
             raise InputError.one("--allow-stress", "stress, N/mm²", allow_stress, allowed)
     there = patches_of(bare.joint, None if patches is None else str(patches))

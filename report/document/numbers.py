@@ -33,6 +33,11 @@ def raised(bound: object, digits: int = 3) -> float | None:
     return float(nearest if float(nearest) >= number else nearest.next_plus(Context(prec=digits)))
 
 
+def no_less(bound: float) -> str:
+    """0.121: a bound of 0.1201, with three digits, never less than it is; inf if it is infinite."""
+    return "inf" if bound == math.inf else significant(raised(bound))
+
+
 def upwards(bound: float, digits: int = 2) -> str:
     """3.3e-16: a bound above 3.2e-16, never less than it is."""
     shown = raised(bound, digits)

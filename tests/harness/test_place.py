@@ -298,6 +298,8 @@ def test_what_is_not_proven_is_not_said_to_be(strip: Path) -> None:
     step = Step(plans_of(strip, 1, 4), np.inf, Outcome((np.inf,), (0,), (0.1,)))
     said, _ = sentence_on(SearchOutcome([step], range(1), step, [], []), Goal(None, 1.0, 4), np.zeros((1, 2)))
     assert said == "4 fasteners leave inf mm in the one load case, not proven."
+    sample = Sample(step, range(20), "fresh cases", 0, (0.0, 1.0), "fastener")
+    assert sample.sentence(Goal(None, 0.95, 4)).startswith("4 fasteners keep inf mm in 0.0 % of 20 ")
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])

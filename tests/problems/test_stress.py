@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu, spsolve
 from small_joints import degrees
 
 from harness.scene.solution import solve
-from harness.scene.stress import Stresses, largest_of, stress_record, stresses, stresses_of
+from harness.scene.stress import Stresses, largest_of, none_told, stress_record, stresses, stresses_of
 from harness.verification.reference import proof_of
 from problems.effects.local_thickness import LocalThickness
 from problems.effects.thermal_bending import ThermalBending
@@ -24,6 +24,7 @@ from problems.forms.assembly import Mask, Vector
 from problems.input.text_files import read_text
 from problems.model.part import PartModel
 from problems.model.plate import Plate, line_loads
+from problems.model.scene import JointScene
 from problems.model.stress import PartStress, part_stress
 from problems.scene_files import SCENES, read_scene
 from report.figures.answer_maps import answer_figures
@@ -257,6 +258,13 @@ def test_forces_at_points_are_named() -> None:
     (part, *_) = stresses_of(answer.problem.scene, answer.unknowns)
     assert part.near_force.any()
     assert not part.near_force.all()
+
+
+def test_whether_any_stress_is_told_needs_no_factor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("problems.model.joint_model.JointModel.interior", lambda *_: pytest.fail("factored"))
+    scene = read_scene("gallery/installed-fasteners")
+    assert isinstance(scene, JointScene)
+    assert not none_told(scene)
 
 
 def test_superelements_without_recovery_have_none() -> None:
