@@ -79,6 +79,16 @@ def test_both_lines_go_through_the_largest_gap(worst: int) -> None:
     assert names == [f"{name}, after" for name in PAIRS[worst // 21]["pair"]] + ["gap left", "before"]
 
 
+def test_the_lines_of_a_section_are_told_to_a_hundredth_of_a_millimetre() -> None:
+    record, arrays = answer(13)
+    arrays["contact_nodes"] = arrays["contact_nodes"] + np.array([1070.934, 0.0])
+    figure = section_figure(record, arrays)
+    assert figure is not None
+    place = coordinate(arrays["contact_nodes"][13, 0])
+    assert place.endswith(".93")
+    assert figure.axes[1].get_title() == f"along y at x = {place} mm"
+
+
 def test_scattered_contacts_have_no_section() -> None:
     record, arrays = answer(3)
     arrays["contact_nodes"] = arrays["contact_nodes"] + np.random.default_rng(0).normal(size=(42, 2))
