@@ -35,7 +35,7 @@ from harness.results.schema import OWNERS, ROUND, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.terminal import INTERRUPTED
 from report.analysis.standings import of_fastest
-from report.document.numbers import listed
+from report.document.numbers import counted, listed
 from report.results.reader import read
 from report.sections.series_throughput import compared
 from report.sections.time_to_solution import against_ours, how_fast_table, ours_and_others
@@ -229,8 +229,8 @@ def write_index(folder: Path) -> Path:
         lines.append(line | {"rows": len(rows)} | {verdict: verdicts[verdict] for verdict in VERDICTS})
     machines = _machines([row for rows in published.values() for row in rows])
     text = (
-        f"# Published results\n\nMeasured on {len(machines)} machines: {'; '.join(machines)}. Each row "
-        "names its machine; a series (`gaps…`) has it in `series.sqlite`, and no day. "
+        f"# Published results\n\nMeasured on {counted(len(machines), 'machine')}: {'; '.join(machines)}. "
+        "Each row names its machine; a series (`gaps…`) has it in `series.sqlite`, and no day. "
         "`python -m harness report DIRECTORY` draws the report of a suite from its rows.\n\n"
     )
     table = pd.DataFrame(lines).rename(columns=lambda name: name.replace("_", " "))

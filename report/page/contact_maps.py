@@ -196,7 +196,7 @@ def _add_map(
         return False
     if place not in groups:
         groups.append(place)
-    about = counted(len(nodes), noun) + (f", every {step}th of which is drawn" if step > 1 else "") + "."
+    about = counted(len(nodes), noun) + (f", one in {step} of which is drawn" if step > 1 else "") + "."
     x, y = np.reshape(marks, (-1, 2)).T.tolist()
     page["maps"].append(
         {

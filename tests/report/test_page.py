@@ -208,7 +208,7 @@ def test_two_answers_have_both_gaps_and_their_difference() -> None:
 def test_of_many_contacts_every_kth_is_in_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(contact_maps, "MOST", 1000)
     made = run_data(read(everything(tmp_path, {4386: [100]})))["maps"]["maps"][0]
-    assert made["about"].startswith("2193 contacts, every 3th of which is drawn.")
+    assert made["about"].startswith("2193 contacts, one in 3 of which is drawn.")
     assert len(unpacked(made["fields"]["gap before"]["values"])) == 731
 
 
