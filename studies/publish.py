@@ -34,6 +34,7 @@ from harness.results.provenance import ROOT, provenance
 from harness.results.schema import OWNERS, ROUND, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.terminal import INTERRUPTED
+from harness.verification.reference_problem import PROBLEMS
 from report.analysis.standings import of_fastest
 from report.document.numbers import counted, listed
 from report.results.reader import read
@@ -131,8 +132,9 @@ def begin(name: str, directory: Path) -> None:
     if kept := [row for row in rows if row["key"].partition(ROUND)[0] in planned]:
         (directory / "logs").mkdir(parents=True)
         records.rewrite(directory / records.MEASUREMENTS, kept)
-        for path in [*source.glob("machine*.json"), *source.glob(records.OUTDATED)]:
-            shutil.copy(path, directory)
+        for facts in ("machine*.json", PROBLEMS, records.OUTDATED):
+            for path in source.glob(facts):
+                shutil.copy(path, directory)
         for log in filter(None, (row.get("log") for row in kept)):
             if (source / log).is_file():
                 shutil.copy(source / log, directory / log)
