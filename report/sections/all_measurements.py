@@ -83,7 +83,7 @@ def _iterations(row: Mapping[str, Any]) -> str:
 def _total(row: Mapping[str, Any]) -> str:
     """The seconds, or the time limit of a run that was stopped by it."""
     if row["verdict"] != "within" and row["status"] == "time_limit" and row["time_limit_s"] > 0:
-        return f"> {row['time_limit_s']:.4g} s (time limit)"
+        return f"> {row['time_limit_s']:g} s (time limit)"
     return significant(row["total_s"])
 
 

@@ -159,5 +159,5 @@ def _cell(cell: Mapping[str, Any]) -> Cell:
         case "cannot_be_judged":
             return Cell("?", "#F1F1F1")
     if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
-        return Cell(f"> {cell['time_limit_s']:.4g} s", "#F1F1F1")
+        return Cell(f"> {cell['time_limit_s']:g} s", "#F1F1F1")
     return Cell(SHORT.get(cell["status"], cell["status"].replace("_", " ")), "#F1F1F1")
