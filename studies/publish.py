@@ -132,8 +132,8 @@ def begin(name: str, directory: Path) -> None:
     if kept := [row for row in rows if row["key"].partition(ROUND)[0] in planned]:
         (directory / "logs").mkdir(parents=True)
         records.rewrite(directory / records.MEASUREMENTS, kept)
-        for facts in ("machine*.json", PROBLEMS, records.OUTDATED):
-            for path in source.glob(facts):
+        for pattern in ("machine*.json", PROBLEMS, records.OUTDATED):
+            for path in source.glob(pattern):
                 shutil.copy(path, directory)
         for log in filter(None, (row.get("log") for row in kept)):
             if (source / log).is_file():
