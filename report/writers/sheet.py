@@ -36,8 +36,8 @@ MESH = "The mesh error is not part of it; the sheet of a single joint has it."
 class Sheet:
     """The content of a sheet. kind : of the verdict, "pass", "fail" or "". sure, origin : sentences.
 
-    inputs : SHA-256 of the files that were read, by name; MOST_FILES are shown. tables : of which what does not
-    fit is left out.
+    inputs : SHA-256 of the files that were read, by name; MOST_FILES are shown. tables : what does not fit of
+    them is left out.
     """
 
     title: str
