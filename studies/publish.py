@@ -34,8 +34,9 @@ from harness.results.provenance import ROOT, provenance
 from harness.results.schema import OWNERS, ROUND, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.terminal import INTERRUPTED
+from harness.verification.reference_problem import PROBLEMS
 from report.analysis.standings import of_fastest
-from report.document.numbers import listed
+from report.document.numbers import counted, listed
 from report.results.reader import read
 from report.sections.series_throughput import compared
 from report.sections.time_to_solution import against_ours, how_fast_table, ours_and_others
@@ -131,8 +132,9 @@ def begin(name: str, directory: Path) -> None:
     if kept := [row for row in rows if row["key"].partition(ROUND)[0] in planned]:
         (directory / "logs").mkdir(parents=True)
         records.rewrite(directory / records.MEASUREMENTS, kept)
-        for path in [*source.glob("machine*.json"), *source.glob(records.OUTDATED)]:
-            shutil.copy(path, directory)
+        for pattern in ("machine*.json", PROBLEMS, records.OUTDATED):
+            for path in source.glob(pattern):
+                shutil.copy(path, directory)
         for log in filter(None, (row.get("log") for row in kept)):
             if (source / log).is_file():
                 shutil.copy(source / log, directory / log)
@@ -229,8 +231,8 @@ def write_index(folder: Path) -> Path:
         lines.append(line | {"rows": len(rows)} | {verdict: verdicts[verdict] for verdict in VERDICTS})
     machines = _machines([row for rows in published.values() for row in rows])
     text = (
-        f"# Published results\n\nMeasured on {len(machines)} machines: {'; '.join(machines)}. Each row "
-        "names its machine; a series (`gaps…`) has it in `series.sqlite`, and no day. "
+        f"# Published results\n\nMeasured on {counted(len(machines), 'machine')}: {'; '.join(machines)}. "
+        "Each row names its machine; a series (`gaps…`) has it in `series.sqlite`, and no day. "
         "`python -m harness report DIRECTORY` draws the report of a suite from its rows.\n\n"
     )
     table = pd.DataFrame(lines).rename(columns=lambda name: name.replace("_", " "))

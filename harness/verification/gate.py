@@ -180,8 +180,8 @@ def concluded(findings: list[Finding], baseline: Baseline | None) -> tuple[int, 
     passed = f"Passed: {f'all {rows} are' if len(findings) > 1 else f'{rows} is'} within {limits}."
     if not baseline:
         return DONE, (passed,)
-    errors = f"none exceeds its error there {baseline.margin:g} times"
-    sentences = passed, f"{compared} of them are in {baseline.name}: {errors}."
+    errors = f"none exceeds {baseline.margin:g} times its error in {baseline.name}"
+    sentences = passed, f"Errors compared: {out_of(compared, len(findings), 'gated row')}; {errors}."
     return DONE, (*sentences, timed) if baseline.times else sentences
 
 
@@ -263,4 +263,4 @@ def append_summary(path: Path, outcome: GateOutcome) -> None:
     more = len(findings) - MOST_LINES
     told += f"\n\n… and {more} more" if more > 0 else ""
     with path.open("a", encoding="utf-8") as page:
-        page.write(markdown(f"## The accuracy gate\n\n{' '.join(outcome.sentences)}\n\n{told}\n\n"))
+        page.write(markdown(f"## The accuracy gate\n\n{quoted(' '.join(outcome.sentences))}\n\n{told}\n\n"))

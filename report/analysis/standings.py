@@ -185,7 +185,7 @@ def seconds_text(cell: Mapping[str, Any]) -> str:
     if cell["verdict"] == "within":
         return significant(cell["load_case_s"])
     if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
-        return f"> {cell['time_limit_s']:.4g}"
+        return f"> {cell['time_limit_s']:g}"
     if cell["verdict"] in ANSWERED:
         return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
     return str(cell["status"]).replace("_", " ") or MISSING

@@ -41,8 +41,14 @@ def stage_seconds(results: Results) -> pd.DataFrame:
     if dense.all() or not dense.any():
         return results.cells.iloc[:0]
     cells = cells_of(rows.reset_index(drop=True))
-    facts = {problem.get("scene"): problem for problem in records(results.problems)}
-    built = [_built(cell, facts.get(cell["scene"], {})) for cell in records(cells)]
+    facts: dict[Any, dict[str, Any]] = {}
+    for problem in records(results.problems):  # of a scene, by machine, and the last one
+        scene = problem.get("scene")
+        facts |= {scene: problem, (scene, problem.get("machine")): problem}
+    built = [
+        _built(cell, facts.get((cell["scene"], cell["machine"])) or facts.get(cell["scene"], {}))
+        for cell in records(cells)
+    ]
     lines = cells.assign(**{name: [stages[name] for stages in built] for name in built[0]})
     lines["solving_s"] = lines["setup_s"].fillna(0.0) + lines["solve_s"]
     lines["recovery_s"] = lines["form_s"].fillna(0.0)

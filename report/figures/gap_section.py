@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from report.document.numbers import significant
+from report.document.numbers import coordinate
 
 from . import style
 from .node_cells import Array, grid_of
@@ -26,8 +26,8 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
     row, column = divmod(int(place[seen.gap.argmax()]), len(x))
     faces = {"before": (np.zeros(len(initial)), initial), "after": (first, first + seen.gap)}
     lines = {
-        f"along x at y = {significant(y[row])} mm": ("x, mm", x, row * len(x) + np.arange(len(x))),
-        f"along y at x = {significant(x[column])} mm": ("y, mm", y, np.arange(len(y)) * len(x) + column),
+        f"along x at y = {coordinate(y[row])} mm": ("x, mm", x, row * len(x) + np.arange(len(x))),
+        f"along y at x = {coordinate(x[column])} mm": ("y, mm", y, np.arange(len(y)) * len(x) + column),
     }
     figure = Figure(figsize=(style.WIDTH, 3.0))
     node = np.argsort(place)

@@ -36,6 +36,7 @@ MUSTARD = "#B2B259"
 WIDTH = 9.0  # inches; at 100 pixels per inch the width of a page of text on a screen
 DPI = 160
 COLUMNS = 4  # of a legend below a figure
+ENTRY = 0.21  # inches: a line of a legend beside panels
 
 #: Colour and marker of the solvers for which they were chosen. Any other solver needs no entry: see `looks`.
 FIXED = {
@@ -130,8 +131,8 @@ def figure_above(height: float, handles: list[Line2D]) -> Figure:
 def panels(
     count: int, height: float, handles: list[Line2D], sharex: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """Panels of that height, one below the other, with a legend beside them."""
-    drawing = figure(height * count + 0.4)
+    """Panels of that height, or as high as the legend beside them, one below the other."""
+    drawing = figure(max(height * count, ENTRY * len(handles)) + 0.4)
     drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
     return drawing, list(drawing.subplots(count, 1, squeeze=False, sharex=sharex)[:, 0])
 

@@ -70,12 +70,11 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
 def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
     """The maps of two answers on one junction, one per pair of parts: both gaps, and what the second adds."""
     first, second = (arrays["gap_after"] for arrays in answers)
-    fields = {"first": first, "second": second, "second − first": second - first}
-    page = _pairs(record, fields, answers[0])
-    for made in page["maps"]:
-        change = made["fields"]["second − first"]
-        most = max(-change["low"], change["high"])
-        change |= {"kind": "change", "low": -most, "high": most}
+    change = second - first
+    page = _pairs(record, {"first": first, "second": second, "second − first": change}, answers[0])
+    for made, pair in zip(page["maps"], record["pairs"], strict=False):  # no map without places
+        most = float(abs(change[pair["start"] : pair["stop"]]).max()) or 1.0
+        made["fields"]["second − first"] |= {"kind": "change", "low": -most, "high": most}
     return page
 
 
@@ -196,7 +195,7 @@ def _add_map(
         return False
     if place not in groups:
         groups.append(place)
-    about = counted(len(nodes), noun) + (f", every {step}th of which is drawn" if step > 1 else "") + "."
+    about = counted(len(nodes), noun) + (f", one in {step} of which is drawn" if step > 1 else "") + "."
     x, y = np.reshape(marks, (-1, 2)).T.tolist()
     page["maps"].append(
         {

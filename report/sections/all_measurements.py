@@ -13,7 +13,7 @@ from harness.results.schema import VERDICTS
 from report.analysis.checks import commits_text
 from report.document.blocks import Block, Column, Section, Table, Text, facts_table, number, records, word
 from report.document.escape import file_name, plain
-from report.document.numbers import MISSING, as_number, listed, power, significant, tidy_power, whole
+from report.document.numbers import MISSING, as_number, counted, listed, power, significant, tidy_power, whole
 from report.results.reader import Results
 from report.results.rows import in_order
 
@@ -58,7 +58,7 @@ def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any], machine:
     active, m = cells["active"].max(), cells["m"].max()
     share = f" ({100 * active / m:.0f} % of {m:.0f})" if active == active and m > 0 else ""
     facts = [str(problem.get("title") or "")]
-    facts += [f"{active:.0f} active contacts{share}"] if active == active else []
+    facts += [counted(int(active), "active contact") + share] if active == active else []
     facts += [f"cond(K) = {power(problem['cond_K'])}"] if as_number(problem.get("cond_K")) else []
     title = f"**Scene {scene}**: {', '.join(filter(None, facts))}"
     return Table(f"scene-{file_name(scene)}", title, ordered[["label", *FIGURES, "key"]], columns)
@@ -83,7 +83,7 @@ def _iterations(row: Mapping[str, Any]) -> str:
 def _total(row: Mapping[str, Any]) -> str:
     """The seconds, or the time limit of a run that was stopped by it."""
     if row["verdict"] != "within" and row["status"] == "time_limit" and row["time_limit_s"] > 0:
-        return f"> {row['time_limit_s']:.4g} s (time limit)"
+        return f"> {row['time_limit_s']:g} s (time limit)"
     return significant(row["total_s"])
 
 

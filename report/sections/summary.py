@@ -102,7 +102,7 @@ def summary(results: Results) -> Section | None:
         "*Answers within the limit, then time*, with the best tolerance on each scene. Seconds are "
         "geometric means of the methods within the limit on every scene of the size. The shifted geometric "
         f"mean, exp(mean log(t + {SHIFT_S:g} s)) − {SHIFT_S:g} s, is of the seconds with preparation on all "
-        "scenes; an answer that is missing or outside counts with the largest time limit on its scene."
+        "scenes; where no answer is within the limit, the largest time limit on the scene counts."
     )
     return Section("Summary", [*blocks, Table("summary", caption, table, columns)])
 
@@ -159,5 +159,5 @@ def _cell(cell: Mapping[str, Any]) -> Cell:
         case "cannot_be_judged":
             return Cell("?", "#F1F1F1")
     if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
-        return Cell(f"> {cell['time_limit_s']:.4g} s", "#F1F1F1")
+        return Cell(f"> {cell['time_limit_s']:g} s", "#F1F1F1")
     return Cell(SHORT.get(cell["status"], cell["status"].replace("_", " ")), "#F1F1F1")

@@ -64,9 +64,10 @@ def _summary(record: dict[str, Any]) -> Table:
     share = f"{100 * record['share']:.4g} % of the cases"
     asked = f"the best {record['count']}" if record["count"] else f"the fewest that leave {limit:g} mm"
     after = f", after stage {record['stages'][-1]}" if record["stages"] else ""
+    holes = counted(len(record["candidates"]), "hole")
     facts = {
         "asked for": f"{asked} in {share}{after}",
-        "candidates": f"{len(record['candidates'])} holes, {significant(record['preload'])} N each",
+        "candidates": f"{holes}, {significant(record['preload'])} N each",
         "found": record["said"],
     }
     for n, sample in enumerate(record["samples"], start=1):

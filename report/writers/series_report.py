@@ -168,7 +168,7 @@ def _convergence(series: Series) -> Figure:
     drawing, axes = _axes()
     for q, (colour, line) in zip(QUANTILES[1:], LOOKS, strict=True):
         lines = table[table["quantile"] == q]
-        axes.plot(lines["cases"], lines["gap_mm"], line, color=colour, label=PERCENT[q])
+        axes.plot(lines["cases"], lines["gap_mm"], line, marker=".", color=colour, label=PERCENT[q])
         axes.fill_between(lines["cases"], lines["low_mm"], lines["high_mm"], color=colour, alpha=0.15, lw=0)
     axes.set(xscale="log", xlabel="number of cases", ylabel="largest gap per case, mm")
     style.plain_log(axes.xaxis)

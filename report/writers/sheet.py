@@ -24,6 +24,8 @@ LEFT, WIDTH, TOP, LINE, LOWEST = 0.07, 0.86, 0.96, 0.0145, 0.035  # of the page
 TALLEST, LEAST = 0.5, 0.16  # of a picture
 LETTERS, LETTER, GAP = 125, 0.0072, 0.03  # of a line; width of a letter, and between columns, of the page
 LEAST_LINES = 4  # of each table, before pictures shrink
+SMALL = 7.5  # points, of tables that fit
+MOST_FILES = 24  # that are named
 DIGITS = 12  # of a hash
 GREY = "#555555"
 FINEST = 1e-6  # mm: a smaller error is said to be this
@@ -34,7 +36,8 @@ MESH = "The mesh error is not part of it; the sheet of a single joint has it."
 class Sheet:
     """The content of a sheet. kind : of the verdict, "pass", "fail" or "". sure, origin : sentences.
 
-    inputs : SHA-256 of the files that were read, by name. tables : of which what does not fit is left out.
+    inputs : SHA-256 of the files that were read, by name; MOST_FILES are shown. tables : what does not fit of
+    them is left out.
     """
 
     title: str
@@ -56,7 +59,8 @@ def write_sheet(path: Path, sheet: Sheet) -> None:
     for sentence in sheet.warnings:
         page.text(f"{sentence}.", color=FAIL)
     files = [f"{name}, SHA-256 {digits[:DIGITS]}" for name, digits in sheet.inputs.items()]
-    inputs = [f"Input files: {'; '.join(files)}."] if files else []
+    more = [f"and {len(files) - MOST_FILES} more"] if len(files) > MOST_FILES else []
+    inputs = [f"Input files: {'; '.join([*files[:MOST_FILES], *more])}."] if files else []
     sure = [line for text in (*sheet.sure, *inputs, *sheet.origin) for line in wrap(plain(text), LETTERS)]
     tables = [Printed(table) for table in sheet.tables if len(table.data)]
     rows = [table.rows + 3 for table in tables]
@@ -97,7 +101,8 @@ def origin(record: dict[str, Any]) -> list[str]:
 class Printed:
     """A table as printed: its cells as texts, the widths of its columns, the blocks that fit side by side.
 
-    A column whose cells are all the same stands in the title instead.
+    A column whose cells are all the same stands in the title instead. Where the rest is wider than the
+    page, letters are smaller.
     """
 
     def __init__(self, table: Table) -> None:
@@ -108,7 +113,9 @@ class Printed:
         self.title = "; ".join([table.caption.split("*")[1].rstrip(".:"), *same])
         self.file = f"{table.name}.csv"
         self.heads, *self.lines = zip(*kept, strict=True)
-        self.widths = [max(map(len, texts)) * LETTER + GAP / 2 for texts in kept]
+        widths = [max(map(len, texts)) * LETTER + GAP / 2 for texts in kept]
+        scale = min(WIDTH / sum(widths), 1.0)
+        self.size, self.widths = scale * SMALL, [scale * width for width in widths]
         self.blocks = max(int((WIDTH + GAP) / (sum(self.widths) + GAP)), 1)
         self.rows = -(-len(self.lines) // self.blocks)
 
@@ -141,7 +148,7 @@ class _Page:
                 for text, width in zip(line, table.widths, strict=True):
                     right += width
                     color = GREY if line is table.heads else "black"
-                    self.cell(right - GAP / 2, text, size=7.5, ha="right", color=color)
+                    self.cell(right - GAP / 2, text, size=table.size, ha="right", color=color)
                 self.at -= LINE
         self.at = top - (rows + 2) * LINE
 

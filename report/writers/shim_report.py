@@ -16,7 +16,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import beside, counted, significant, whole
+from report.document.numbers import beside, coordinate, counted, significant, whole
 from report.figures import style
 from report.page.page_file import Data, banner, table_data
 from report.page.page_file import write as write_page
@@ -25,7 +25,7 @@ from report.writers.sheet import Sheet, origin, write_sheet
 
 COLUMNS = {"area, mm²": "area_mm2", "gap before, mm": "gap_before_mm"}
 COLUMNS |= {"gap after, mm": "gap_after_mm", "liquid shim, mm³": "liquid_mm3"}
-FORCES = {"x, mm": "x", "y, mm": "y", "without, N": "force_N", "with shims, N": "with_shims_N"}
+FORCES = {"without, N": "force_N", "with shims, N": "with_shims_N"}
 LIMITS = {"gap": ("mm", "limit_mm"), "force": ("N", "allow_force"), "stress": ("N/mm²", "allow_stress")}
 NEAR = 0.9  # of the limit: a gap is at it
 
@@ -67,7 +67,8 @@ def write(directory: Path) -> Path:
         caption = "*Shims by patch*; one without a thickness has none."
         blocks.append(Table("shims", caption, patches.drop(columns="outline"), columns))
         if len(forces := pd.DataFrame(record["forces"])):
-            of_forces = [word("kind", "kind"), *(number(*pair) for pair in FORCES.items())]
+            places = (number(f"{axis}, mm", axis, coordinate) for axis in "xy")
+            of_forces = [word("kind", "kind"), *places, *(number(*pair) for pair in FORCES.items())]
             caption = "*Forces in fasteners* of the scene as its file has it."
             blocks.append(Table("forces", caption, forces, of_forces))
         facts = facts_table("", "*The question and its answer.*", _facts(record, patches, len(shims)))

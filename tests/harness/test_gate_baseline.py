@@ -43,7 +43,7 @@ def test_lost_digits_are_reported(finished: Path, copy: Path, shift: float, marg
     done = gate(copy, "--baseline", finished, "--margin", margin)
     assert done.exit_code == code, done.output
     if not code:
-        assert "2 of them are in" in done.stdout
+        assert "Errors compared: 2 of 2 gated rows" in done.stdout
 
 
 def test_no_scene_is_opened_without_kept_answers(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -309,6 +309,12 @@ def test_the_page_of_a_job_is_no_longer_than_github_takes(tmp_path: Path) -> Non
     page = (tmp_path / "page.md").read_text("utf-8")
     assert len(page.encode()) < 2**20
     assert page.rstrip().endswith("… and 4800 more")
+
+
+def test_names_are_no_markup_on_the_page_of_a_job(tmp_path: Path) -> None:
+    good = Finding("tiny exact", Judgement("within", displacement_error_mm=1e-9), 1e-7)
+    append_summary(tmp_path / "page.md", GateOutcome([good], 0, ("None exceeds its error in <b>/*old*.",)))
+    assert r"in &lt;b&gt;/\*old\*." in (tmp_path / "page.md").read_text("utf-8")
 
 
 def test_an_error_has_the_digits_that_show_it_on_its_side_of_the_limit() -> None:

@@ -197,6 +197,13 @@ def test_a_row_that_is_no_longer_planned_is_not_kept(
     assert {row["variant"] for row in rows_of(directory) if row["beside_round"]} == {"a"}
 
 
+def test_what_matrices_took_is_kept_beside_the_rows_that_need_it(release: Callable[..., list[Row]]) -> None:
+    release("first")
+    published.begin("small", directory := published.STAGED / "second")
+    problems, kept = (folder / "problems.jsonl" for folder in (published.PUBLISHED / "small", directory))
+    assert kept.read_text() == problems.read_text()
+
+
 def test_after_an_hour_there_is_another_round(
     release: Callable[..., list[Row]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

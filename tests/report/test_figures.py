@@ -72,6 +72,17 @@ def test_any_number_of_variants_look_different_also_on_the_page(form: str) -> No
         assert styles[methods[0]]["color"] == style.FIXED["piqp"][0].lower()
 
 
+def test_a_legend_beside_a_panel_is_whole() -> None:
+    """A run of all solvers in all forms has more methods than a panel is high."""
+    handles = style.legend_entries({f"method {k}": {"marker": "o"} for k in range(60)})
+    with style.applied():
+        drawing, _ = style.panels(1, 3.0, handles)
+        drawing.draw_without_rendering()
+        (legend,) = drawing.legends
+        box = legend.get_window_extent()
+    assert 0 <= box.y0 < box.y1 <= drawing.bbox.height
+
+
 def test_every_ladder_of_numbers_says_what_its_rungs_count() -> None:
     assert set(ladders("hard/")) == set(COUNTED) | NAMED
 

@@ -205,10 +205,19 @@ def test_two_answers_have_both_gaps_and_their_difference() -> None:
     np.testing.assert_array_equal(np.transpose(places), nodes[4:])
 
 
+def test_a_change_has_its_colours_though_no_gap_is_larger() -> None:
+    nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 20.0)])
+    answers = [{"contact_nodes": nodes, "gap_after": np.full(6, gap)} for gap in (0.3, 0.1)]
+    pairs = [{"pair": ["a", "b"], "start": 0, "stop": 6}]
+    (made,) = contact_maps.two_answers_maps({"pairs": pairs}, answers)["maps"]
+    change = made["fields"]["second − first"]
+    assert [change["low"], change["high"]] == pytest.approx([-0.2, 0.2])
+
+
 def test_of_many_contacts_every_kth_is_in_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(contact_maps, "MOST", 1000)
     made = run_data(read(everything(tmp_path, {4386: [100]})))["maps"]["maps"][0]
-    assert made["about"].startswith("2193 contacts, every 3th of which is drawn.")
+    assert made["about"].startswith("2193 contacts, one in 3 of which is drawn.")
     assert len(unpacked(made["fields"]["gap before"]["values"])) == 731
 
 

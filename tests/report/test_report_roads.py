@@ -84,6 +84,18 @@ def test_only_answers_within_the_limit_at_a_known_cost_have_a_total(tmp_path: Pa
     assert pd.isna(unknown.loc["newton (dual)", "total_1_s"])
 
 
+def test_matrices_cost_what_they_took_on_the_machine_of_a_row(tmp_path: Path) -> None:
+    """Rows of rounds of two machines stand beside one another."""
+    rows = [sparse(), dense(), dense(machine="Slow CPU")]
+    slow = {step: 10 * seconds for step, seconds in BUILD.items()}
+    problems = [
+        {"scene": LOW, "machine": machine, "build_s": build}
+        for machine, build in (("Made-up CPU, 2 cores", BUILD), ("Slow CPU", slow))
+    ]
+    found = stage_seconds(results(tmp_path, rows, *problems))[lambda lines: lines["form"] == "dual"]
+    assert found.set_index("machine")["K_s"].to_dict() == {"Made-up CPU, 2 cores": 8.5, "Slow CPU": 85.0}
+
+
 def test_a_run_without_an_answer_has_no_seconds_of_solving(tmp_path: Path) -> None:
     found = lines(tmp_path, [sparse(), dense() | no_answer("time_limit")])
     assert pd.isna(found.loc["newton (dual)", "solving_s"])

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,16 @@ def test_both_lines_go_through_the_largest_gap(worst: int) -> None:
     (legend,) = figure.legends
     names = [text.get_text() for text in legend.get_texts()]
     assert names == [f"{name}, after" for name in PAIRS[worst // 21]["pair"]] + ["gap left", "before"]
+
+
+def test_the_lines_of_a_section_are_told_to_a_hundredth_of_a_millimetre() -> None:
+    record, arrays = answer(13)
+    arrays["contact_nodes"] = arrays["contact_nodes"] + np.array([1070.934, 0.0])
+    figure = section_figure(record, arrays)
+    assert figure is not None
+    place = coordinate(arrays["contact_nodes"][13, 0])
+    assert place.endswith(".93")
+    assert figure.axes[1].get_title() == f"along y at x = {place} mm"
 
 
 def test_scattered_contacts_have_no_section() -> None:
@@ -161,6 +172,33 @@ def test_the_sheet_is_one_page_that_prints_on_a4_and_letter(
     assert (left > 0) == (count > 24)
     assert sum(text in {significant(9.0 + k) for k in range(count)} for text in texts) == count - left
     assert ("y, mm: 2" in whole) == (count > 1)  # where all are the same
+
+
+def test_a_table_with_many_columns_is_no_wider_than_the_page() -> None:
+    """As that of stages with many effects that press."""
+    names = [f"installed_fasteners {k}, N" for k in range(7)]
+    forces = pd.DataFrame([[1000.0 + k for k in range(7)]], columns=names)
+    page = sheet._Page()
+    page.table(sheet.Printed(Table("stages", "*The stages.*", forces, [number(n, n) for n in names])), 0.5)
+    page.figure.set_dpi(400)
+    renderer = FigureCanvasAgg(page.figure).get_renderer()
+    boxes = [text.get_window_extent(renderer) for text in page.figure.texts]
+    width = page.figure.get_figwidth() * page.figure.dpi
+    assert len(boxes) == 15
+    assert all(0 < box.x0 < box.x1 < width for box in boxes)
+    assert not any(one.overlaps(other) for one, other in combinations(boxes[1:], 2))
+
+
+def test_many_input_files_leave_room_for_the_origin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages: list[Any] = []
+    monkeypatch.setattr(sheet._Page, "__init__", keeping(pages, sheet._Page.__init__))
+    inputs = {f"scan-{k}.csv": "0123456789abcdef" * 4 for k in range(1000)}
+    content = sheet.Sheet("A joint", "", "No limit.", [], origin({"scene": "here"}), inputs)
+    write_sheet(tmp_path / "sheet.pdf", content)
+    (page,) = pages
+    texts = page.figure.texts
+    assert "and 976 more. Scene: here" in " ".join(text.get_text() for text in texts)
+    assert min(text.get_position()[1] for text in texts) > 0
 
 
 def keeping(pages: list[Any], begin: Callable[[Any], None]) -> Callable[[Any], None]:

@@ -71,6 +71,7 @@ def test_what_is_whole_takes_the_place_of_the_old(there: Path, monkeypatch: pyte
     for name in SUITES:
         assert published.is_of(published.rows_of(there / name), CODE)
     lines = (there / "index.md").read_text("utf-8").splitlines()
+    assert lines[2].startswith("Measured on 1 machine: m. Each row")
     assert [line.split(" | ")[0].strip("| ") for line in lines[-2:]] == [f"[{n}]({n})" for n in SUITES]
     assert all("cccccccccccc |" in line for line in lines[-2:])
     assert publish(monkeypatch, good) == (0, [])
