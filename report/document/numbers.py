@@ -33,11 +33,6 @@ def raised(bound: object, digits: int = 3) -> float | None:
     return float(nearest if float(nearest) >= number else nearest.next_plus(Context(prec=digits)))
 
 
-def no_less(bound: float) -> str:
-    """0.121: a bound of 0.1201, with three digits, never less than it is; inf if it is infinite."""
-    return "inf" if bound == math.inf else significant(raised(bound))
-
-
 def upwards(bound: float, digits: int = 2) -> str:
     """3.3e-16: a bound above 3.2e-16, never less than it is."""
     shown = raised(bound, digits)
@@ -84,6 +79,19 @@ def beside(limit: float) -> Callable[[object], str]:
     def shown(value: object) -> str:
         digits = digits_beside(limit, as_number(value) or 0.0)
         return "inf" if value == math.inf else significant(value, digits)
+
+    return shown
+
+
+def no_less(limit: float = math.inf) -> Callable[[object], str]:
+    """As `beside`, for bounds: rounded upwards, so that what is shown is never less than the bound."""
+
+    def shown(bound: object) -> str:
+        number = as_number(bound)
+        if number is None:
+            return "inf" if bound == math.inf else MISSING
+        digits = next(k for k in range(3, 18) if ((raised(number, k) or 0.0) > limit) == (number > limit))
+        return significant(raised(number, digits), digits)
 
     return shown
 
