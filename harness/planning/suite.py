@@ -35,7 +35,7 @@ from problems.input.bounded_types import (
 )
 from problems.ladders import prefix_of, rung_names
 from problems.random_scenes import EXAMPLES, drawn_names
-from problems.scene_files import read_scene, read_toml, scene_names
+from problems.scene_files import SCENES, read_scene, read_toml, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names
 
@@ -238,6 +238,14 @@ def _is_file(scene: object) -> bool:
     return Path(str(scene)).suffix in (".toml", ".npz")
 
 
+def _name_of(scene: str) -> str:
+    """The name of a scene that is given by its name or by the path of a file."""
+    if not _is_file(scene):
+        return scene
+    path = Path(scene).with_suffix("")
+    return path.relative_to(SCENES).as_posix() if path.is_relative_to(SCENES) else path.name
+
+
 def _entries(data: dict[str, Any]) -> list[dict[str, Any]]:
     """The tables [[solver]]; what is something else is refused when they are validated."""
     entries = data["solver"] if isinstance(data.get("solver"), list) else []
@@ -273,11 +281,10 @@ def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
 
 def _elsewhere(suite: Suite, path: Path) -> Iterator[Fault]:
     """Scenes of entries that are none of the suite's: there, nothing would be measured."""
-    scenes = [(Path(scene).stem if _is_file(scene) else scene, scene) for scene in suite.scenes]
     for k, entry in enumerate(suite.solver):
         for scene in entry.scenes or ():
             alone = entry.model_copy(update={"scenes": [scene]})
-            if not any(alone.takes(*each) for each in scenes):
+            if not any(alone.takes(_name_of(each), each) for each in suite.scenes):
                 allowed = "a scene among those of the suite, or a glob of some"
                 yield Fault(str(path), f"solver.{k}.scenes", scene, allowed)
 
@@ -313,7 +320,7 @@ def _planned_twice(suite: Suite, one: SolverEntry, other: SolverEntry) -> Iterat
     form = min({*(one.forms or ["dual"])} & {*(other.forms or ["dual"])}, default="")
     threads = min({*(one.threads or suite.threads)} & {*(other.threads or suite.threads)}, default=0)
     for scene in suite.scenes if tolerance and form and threads else ():
-        name = Path(scene).stem if _is_file(scene) else scene
+        name = _name_of(scene)
         if one.takes(name, scene) and other.takes(name, scene):
             words = [name, one.name, form, *filter(None, [one.label]), f"tol={tolerance}"]
             yield scene, " ".join([*words, f"threads={threads}"])
