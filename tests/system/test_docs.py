@@ -137,6 +137,12 @@ def test_no_sentence_has_more_than_thirty_words(page: Path) -> None:
 
 
 @each_page
+def test_the_lines_of_tables_are_not_joined(page: Path) -> None:
+    for line in page.read_text("utf-8").splitlines():
+        assert "|-" not in line or re.fullmatch(r"\s*[-|: ]+", line), line
+
+
+@each_page
 def test_paths_of_code_exist(page: Path) -> None:
     """`harness/….py`, `problems/effects/`; not those with a <name> to fill in."""
     folders = "harness|problems|solvers|report|tests|examples"
