@@ -100,6 +100,10 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
                 if name in plain:
                     allowed = "one of the two: the matrix alone, or its four parts"
                     raise InputError.one(path, name, [name, f"{name}_data"], allowed)
+                layout = f"{name}_format"
+                if layout in files and (said := np.asarray(archive[layout]).astype(str).item()) != "csc":
+                    allowed = f"csc: the parts are read as compressed columns; save those of {name}.tocsc()"
+                    raise InputError.one(path, layout, said, allowed)
             names = stems + [name for name in plain if name in expected or _kind(archive, name) in NUMBERS]
             wanted = choose(names)
             chosen = {

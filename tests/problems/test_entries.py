@@ -239,6 +239,21 @@ def test_arrays_beside_a_problem_are_refused_or_said() -> None:
         read_matrices({"problem": Path("mine.npz")})
 
 
+def test_parts_that_say_that_they_are_compressed_rows_are_refused() -> None:
+    """Those of a square matrix would be read as its transpose."""
+    A = np.array([[1.0, -1.0], [0.0, 1.0]])
+    problem = {"K": K, "f": np.ones(2), "g": np.ones(2)}
+    for kind in (sp.csc_array, sp.csr_array):
+        parts = {f"A_{part}": getattr(kind(A), part) for part in ("data", "indices", "indptr", "shape")}
+        np.savez("mine.npz", **problem, **parts, A_format=kind(A).format)
+        if kind is sp.csc_array:
+            read_back = read_matrices({"problem": Path("mine.npz")})[0].A
+            np.testing.assert_array_equal(read_back.toarray(), A)
+        else:
+            with pytest.raises(InputError, match="A_format = .csr.: csc: the parts are read as compressed col"):
+                read_matrices({"problem": Path("mine.npz")})
+
+
 def test_a_load_is_a_vector() -> None:
     problem = {"K": np.eye(6), "A": np.eye(6, 2), "f": np.ones((6, 1)), "g": np.ones((1, 2))}
     assert checked(problem, {})[1].f.shape == (6,)
