@@ -251,9 +251,7 @@ def test_parts_that_say_that_they_are_compressed_rows_are_refused() -> None:
             read_back = read_matrices({"problem": Path("mine.npz")})[0].A
             np.testing.assert_array_equal(read_back.toarray(), A)
         else:
-            with pytest.raises(
-                InputError, match="A_format = .csr.: csc: the parts are read as compressed col"
-            ):
+            with pytest.raises(InputError, match=r"A_format = .csr.: csc"):
                 read_matrices({"problem": Path("mine.npz")})
 
 
