@@ -123,7 +123,7 @@ def read_answer(path: Path) -> dict[str, Vector]:
                 names = {name: name for name in VECTORS if name in archive.files}
                 if "x" in names and "unknowns" in archive.files:
                     names["x"] = "unknowns"
-                arrays = {name: archive[stored] for name, stored in names.items()}
+                arrays = {name: np.asarray(archive[stored]) for name, stored in names.items()}
     vectors: dict[str, Vector] = {}
     for heading, array in arrays.items():
         if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):

@@ -117,7 +117,8 @@ def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tu
         raise InputError.one(path, "matrices", list(names), f"a matrix {wanted}{how}")
 
     ((chosen, (M, labels)),) = read_labelled(path, choose).items()
-    others += matrix_files.texts_of(path)
+    with matrix_files.reading(path, "file", "a readable matrix file"):
+        others += matrix_files.texts_of(path)
     return M, labels, [one for one in others if one != chosen]
 
 

@@ -109,7 +109,8 @@ def mirrored(M: sp.csr_array, sign: int = 1) -> sp.csr_array:
 
 def contradictions(K: sp.csr_array, sign: int = 1) -> list[tuple[int, int]]:
     """The pairs (i, j), i ≤ j, whose two entries differ by more than rounding, in the order of their rows."""
-    apart, sizes = sp.coo_array(sp.triu(K - sign * K.T)), np.sqrt(abs(K.diagonal().astype(float)))
+    apart = sp.coo_array(sp.triu(K - K.T if sign == 1 else K + K.T))  # sign * K.T would be a copy of K
+    sizes = np.sqrt(abs(K.diagonal().astype(float)))
     i, j = apart.coords
     wrong = abs(apart.data) > SYMMETRY * sizes[i] * sizes[j]
     return sorted(zip(i[wrong].tolist(), j[wrong].tolist(), strict=True))

@@ -70,7 +70,13 @@ def packed(arrays: Mapping[str, Any]) -> dict[str, Any]:
 def unpacked(arrays: Mapping[str, Any], name: str) -> sp.csc_array:
     """The sparse matrix of that name among packed arrays."""
     data, indices, indptr, shape = (np.array(arrays[f"{name}_{part}"]) for part in PARTS)
-    return sp.csc_array((data, indices, indptr), shape=tuple(shape.tolist()))
+    return sp.csc_array((_supported(data), indices, indptr), shape=tuple(shape.tolist()))
+
+
+def _supported(numbers: Any) -> Any:
+    """Numbers as SciPy's sparse matrices take them: of this machine's byte order, none of 16 bits."""
+    least = np.dtype(np.float32) if numbers.dtype.kind == "f" else numbers.dtype
+    return numbers.astype(np.promote_types(numbers.dtype, least), copy=False)
 
 
 def write(path: Path, arrays: Mapping[str, Any]) -> None:
@@ -100,10 +106,14 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
                 if name in plain:
                     allowed = "one of the two: the matrix alone, or its four parts"
                     raise InputError.one(path, name, [name, f"{name}_data"], allowed)
+                layout = f"{name}_format"
+                if layout in files and (said := np.asarray(archive[layout]).astype(str).item()) != "csc":
+                    allowed = f"csc: the parts are read as compressed columns; save those of {name}.tocsc()"
+                    raise InputError.one(path, layout, said, allowed)
             names = stems + [name for name in plain if name in expected or _kind(archive, name) in NUMBERS]
             wanted = choose(names)
             chosen = {
-                name: unpacked(archive, name) if name in stems else np.atleast_1d(archive[name])
+                name: unpacked(archive, name) if name in stems else _supported(np.atleast_1d(archive[name]))
                 for name in wanted
             }
     for name, M in chosen.items():
@@ -124,7 +134,7 @@ def texts_of(path: Path) -> list[str]:
 def _kind(archive: Any, name: str) -> str:
     """The kind of an array's entries; "" if it has no dimension, or holds objects."""
     try:
-        array = archive[name]
+        array = np.asarray(archive[name])  # bytes, if a file that is no array was put into it
     except ValueError:  # of objects
         return ""
     return array.dtype.kind if array.ndim else ""

@@ -131,7 +131,7 @@ def checked(
     if rounded := [key for key in "KAfg" if not _fits(data[key])]:
         notes.append(f"Numbers of {', '.join(rounded)} that float64 cannot hold were rounded to the nearest")
     if skew:
-        K = sp.csr_array(K / 2 + K.T / 2)
+        K = sp.csr_array((K + K.T) / 2)
         notes.append(f"K, asymmetric by {skew:.1e} N/mm, was replaced by (K + Kᵀ)/2")
     A = sp.csc_array(A)
     made = Stiffness.of(*([sp.csc_array(K)] if sparse else dense_blocks(K)), nodes=nodes)

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pandas as pd
@@ -275,6 +276,12 @@ def test_what_is_no_answer_of_this_problem_is_refused(name: str, scenes: Path, t
     done = harness("judge", path, scenes / "tiny.npz")
     assert done.exit_code == code, done.output
     assert message in done.stderr
+
+
+def test_a_text_in_an_npz_is_no_answer(scenes: Path, tmp_path: Path) -> None:
+    with ZipFile(tmp_path / "x.npz", "w") as archive:
+        archive.writestr("x", "0.0")
+    assert "a vector of numbers" in wrong_usage("judge", tmp_path / "x.npz", scenes / "tiny.npz")
 
 
 def test_forces_whose_displacements_overflow_are_refused(tmp_path: Path) -> None:

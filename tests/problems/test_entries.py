@@ -5,6 +5,7 @@ import struct
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -237,6 +238,46 @@ def test_arrays_beside_a_problem_are_refused_or_said() -> None:
     np.savez("mine.npz", **problem, **parts)
     with pytest.raises(InputError, match=r"K = .*one of the two: the matrix alone, or its four parts"):
         read_matrices({"problem": Path("mine.npz")})
+
+
+def test_parts_that_say_that_they_are_compressed_rows_are_refused() -> None:
+    """Those of a square matrix would be read as its transpose."""
+    A = np.array([[1.0, -1.0], [0.0, 1.0]])
+    problem = {"K": K, "f": np.ones(2), "g": np.ones(2)}
+    for kind in (sp.csc_array, sp.csr_array):
+        parts = {f"A_{part}": getattr(kind(A), part) for part in ("data", "indices", "indptr", "shape")}
+        np.savez("mine.npz", **problem, **parts, A_format=kind(A).format)
+        if kind is sp.csc_array:
+            read_back = read_matrices({"problem": Path("mine.npz")})[0].A
+            np.testing.assert_array_equal(read_back.toarray(), A)
+        else:
+            with pytest.raises(InputError, match=r"A_format = .csr.: csc"):
+                read_matrices({"problem": Path("mine.npz")})
+
+
+@pytest.mark.parametrize("kind", [">f8", "f2"])
+def test_numbers_that_sparse_matrices_do_not_hold_are_imported(kind: str) -> None:
+    """Of a machine with another byte order, or of half precision."""
+    problem = {"K": K, "A": np.eye(2, 1), "f": np.ones(2), "g": np.ones(1)}
+    np.savez("mine.npz", **{name: values.astype(kind) for name, values in problem.items()})
+    import_matrices(["mine.npz"], "out.npz")
+    for name, values in problem.items():
+        np.testing.assert_array_equal(np.load("out.npz")[name], values)
+
+
+def test_a_damaged_array_beside_the_one_that_is_read_is_refused() -> None:
+    np.savez("job.npz", K=K, A=np.full((2, 1), 7.0))
+    content = Path("job.npz").read_bytes()
+    Path("job.npz").write_bytes(content.replace(np.float64(7.0).tobytes(), np.float64(8.0).tobytes()))
+    with pytest.raises(InputError, match=r"job.npz: file = 'damaged.*a readable matrix file"):
+        formats.read_stiffness(Path("job.npz"))
+
+
+def test_a_text_that_was_put_into_an_npz_is_no_array() -> None:
+    np.savez("job.npz", KAA=K)
+    with ZipFile("job.npz", "a") as archive:
+        archive.writestr("README.txt", "made by hand")
+    np.testing.assert_array_equal(formats.read_stiffness(Path("job.npz"))[0], K)
 
 
 def test_a_load_is_a_vector() -> None:
