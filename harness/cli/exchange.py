@@ -107,7 +107,7 @@ def judge(
 
     \b
     Exit codes: 0 within the limit, 1 outside, 2 wrong usage or bad input (NaN, not numbers),
-                3 the reference is not proven well enough, 5 an x of another problem's length.
+                3 the reference is not proven well enough, 5 an x or λ of another problem's length.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.judge_file import judge_file
