@@ -23,8 +23,8 @@ def export(
     """Write a scene for another program: K, A, f, g in a file format, or the program of a form.
 
     With --form: P, q, G, h (or the lower bounds lb) of min ½zᵀPz + qᵀz, Gz ≤ h, as .npz, .mps, .qps or, with
-    no suffix, a folder of Matrix Market files. Readers in Python, C++, Julia and Matlab: docs/exchange.md. Of
-    a suite: PATH.parquet, a test set of qpbenchmark.
+    no suffix, a folder of Matrix Market files. Readers in Python, C++, Julia and Matlab: docs/exchange.md.
+    For a suite: PATH.parquet, a test set of qpbenchmark.
 
     \b
     Examples:
