@@ -34,8 +34,8 @@ def compare(
 
     Worse is a worse verdict, more digits of the error lost than allowed, a time per load case beyond the
     allowed ratio and beyond the noise of both sides, or a measurement that is missing. Every NEW is compared
-    with OLD. Times are compared if both sides are of one machine. Of a search for a tolerance, what it
-    keeps is compared, whichever that is; runs that a trace stopped are not.
+    with OLD. Times are compared if both sides are of one machine. From a search for a tolerance, what it
+    keeps is compared; runs that a trace stopped are not.
 
     \b
     Examples:

@@ -23,8 +23,8 @@ def export(
     """Write a scene for another program: K, A, f, g in a file format, or the program of a form.
 
     With --form: P, q, G, h (or the lower bounds lb) of min ½zᵀPz + qᵀz, Gz ≤ h, as .npz, .mps, .qps or, with
-    no suffix, a folder of Matrix Market files. Readers in Python, C++, Julia and Matlab: docs/exchange.md. Of
-    a suite: PATH.parquet, a test set of qpbenchmark.
+    no suffix, a folder of Matrix Market files. Readers in Python, C++, Julia and Matlab: docs/exchange.md.
+    For a suite: PATH.parquet, a test set of qpbenchmark.
 
     \b
     Examples:
@@ -107,7 +107,7 @@ def judge(
 
     \b
     Exit codes: 0 within the limit, 1 outside, 2 wrong usage or bad input (NaN, not numbers),
-                3 the reference is not proven well enough, 5 an x of another problem's length.
+                3 the reference is not proven well enough, 5 an x or λ of another problem's length.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.judge_file import judge_file

@@ -49,12 +49,12 @@ def solve(
     that answer. If the parts do not meet, this is a linear solve. The error of the finite-element mesh is
     estimated from a coarser one.
 
-    The stages of a scene are solved in turn, and told in a table; --allow-gap decides on the last one.
+    The stages of a scene are solved in turn, and listed in a table; --allow-gap decides on the last one.
 
     Two scenes on one junction, such as two plans of fasteners, are solved into DIR/first and DIR/second and
     compared: gaps side by side, a map of the difference, the force in each fastener. --allow-gap then decides
-    on the second. If their meshes differ, gaps are compared at the contacts of the coarser one, and it is
-    said whether the mesh changes the verdict.
+    on the second. If their meshes differ, gaps are compared at the contacts of the coarser one, and the
+    command says whether the mesh changes the verdict.
 
     \b
     Examples:

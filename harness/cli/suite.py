@@ -37,7 +37,7 @@ def run(
     ] = None,
     tolerance: Annotated[
         list[str] | None,
-        option("TOL", "Tolerance passed to the solvers, repeatable; auto: the loosest decade that suffices."),
+        option("TOL", "Tolerance passed to the solvers, repeatable; auto: the loosest one that suffices."),
     ] = None,
     setting: Annotated[
         list[str] | None, option("SOLVER.KEY=VALUE", "An option of a solver. Repeatable.", "--option")
@@ -148,9 +148,9 @@ def gate(
     what lies below the reference's error bound does not count.
 
     --max-slowdown compares a solver's times with those of the other solvers on the scene in the same run, and
-    this ratio with the baseline's, which may be of another machine. It takes three repeats of both.
+    this ratio with the baseline's, which may be of another machine. Both runs need three repeats.
 
-    Of a search for a tolerance, the one that it keeps is judged; runs that a trace stopped are not.
+    From a search for a tolerance, the one that it keeps is judged; runs that a trace stopped are not.
 
     In a job of GitHub's, the outcome is appended to the page of the job ($GITHUB_STEP_SUMMARY).
 

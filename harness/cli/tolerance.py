@@ -20,10 +20,10 @@ def tolerance(
     seed: options.Seed = None,
     scheduler: options.Scheduler = None,
 ) -> None:
-    """Find the largest value of a key that keeps a gap in a share of the joints, or the least.
+    """Find the largest or least value of a key that keeps a gap in a share of the joints.
 
     The end of the range that keeps the share decides which. Each value that is tried is a series of the same
-    load cases, with proven gaps; fresh cases then tell the share at the value that is named. A key may change
+    load cases, with proven gaps; fresh cases then show the share at the value that is found. A key may change
     K. Run the same command again, and it continues. `series --find` is the same with all options of `series`.
 
     \b

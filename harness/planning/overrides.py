@@ -36,7 +36,7 @@ class Overrides:
     forms : tuple of str
         Only these forms.
     tolerances : tuple of float or "auto"
-        Passed to the solvers; "auto": the loosest decade that suffices.
+        Passed to the solvers; "auto": the loosest one that suffices, to half a decade.
     options : tuple of str
         Options of solvers, as "osqp.scaling=0".
     repeats : int, optional
