@@ -116,6 +116,7 @@ BAD = [
     ),
     (('clamped = ["north"]', ""), "part.a", "no support", "clamped edge"),
     (('title = "a strip"', 'titel = "a strip"'), "titel", "a strip", "no such key"),
+    (('title = "a strip"', "output = { stres = true }"), "output.stres", True, "did you mean stress?"),
     (
         ('title = "a strip"', 'assembly = "wing-fragment-4387"'),
         "assembly",
