@@ -16,8 +16,6 @@ from harness.scene.stress import refuse_unusable, stresses, stresses_of
 from harness.shimming.study import ShimStudy
 from harness.verification.reference import proof_of
 from problems.build import model_of
-from problems.formats.matrix_text import write_matrix_market
-from problems.formats.nastran import pyyeti
 from problems.load_cases import Listed
 from problems.model.condensed_plate import CondensedPlate
 from problems.model.joint import Joint
@@ -202,20 +200,6 @@ def test_it_is_in_no_key(tmp_path: Path) -> None:
     parts = point_matrix(tmp_path, GOOD, TWO)
     bare = [{key: value for key, value in part.items() if "stress" not in key} for part in parts]
     assert scene_from(parts).key == scene_from(bare).key
-
-
-@pytest.mark.parametrize("format", ["mtx", "op4"])
-def test_other_formats_are_read(format: str, tmp_path: Path) -> None:
-    S = np.arange(36.0).reshape(6, 6)
-    path = tmp_path / "s" / "A.mtx"
-    if format == "op4":
-        path = tmp_path / "s.op4"
-        pyyeti(path).op4.OP4().write(str(path), {"otm": S}, binary=True)
-    else:
-        data = {"K": np.eye(6), "A": S, "f": np.ones(6), "g": np.ones(6)}
-        write_matrix_market(tmp_path / "s", data)
-    scene = scene_from(point_matrix(tmp_path, GOOD, TWO, stress=str(path)))
-    np.testing.assert_array_equal(scene.joint.parts[0].recovery.S.toarray(), S)
 
 
 TOML = """\
