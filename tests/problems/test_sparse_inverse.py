@@ -84,12 +84,6 @@ def test_the_compliance_of_windows_of_contacts(seed: int) -> None:
         np.testing.assert_array_equal(near(part), window[: len(part), : len(part)])
 
 
-def test_without_a_band_there_is_none() -> None:
-    K = graph_matrix(np.random.default_rng(3), 800)
-    A = sp.csc_array(sp.eye_array(800, 5))
-    assert Stiffness.of(K).local_compliance(A, [np.arange(5)]) is None
-
-
 @pytest.mark.parametrize(
     ("n", "half", "m"), [(200, 7, 30), (201, 7, 90), (50, 49, 9), (30, 1, 30), (9, 0, 4)]
 )
