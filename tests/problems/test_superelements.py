@@ -14,7 +14,6 @@ import skfem
 from argyris_plates import bending
 from refusals import refusal_of
 from scipy.sparse.linalg import splu
-from small_joints import make_scene
 from superelements import (
     Array,
     Tables,
@@ -48,7 +47,7 @@ RANDOM = {"sd": 0.1, "correlation_length": 90.0, "seed": 3}
 def measured(joint: Any) -> Tables:
     """A random gap, given at the nodes."""
     gap = {"kind": "initial_gap", "mean": 0.4, "random": RANDOM}
-    g = load_case(scene_of({"joint": joint.model_dump(exclude_unset=True), "effect": [gap]})).g
+    g = load_case(scene_of({"joint": joint, "effect": [gap]})).g
     return {"kind": "measured_gap", "points": np.column_stack([joint.nodes, g]).tolist()}
 
 
@@ -56,7 +55,7 @@ EFFECTS = (measured(JOINT), FASTENERS, INSTALLED, PRESSURE, CLAMPS, SHIMS)
 
 
 def built_in(*effects: Tables) -> JointScene:
-    return scene_of({"joint": JOINT.model_dump(exclude_unset=True), "effect": list(effects)})
+    return scene_of({"joint": JOINT, "effect": list(effects)})
 
 
 @cache
@@ -188,6 +187,9 @@ def test_meshes_that_do_not_match_converge_to_those_that_do(tmp_path: Path) -> N
     assert errors[-1] < 2e-3
 
 
+MOVED = np.array([3e3, -2e3, 500.0])  # mm
+
+
 def rotation() -> Array:
     """By no small angles, about no axis."""
     Q, R = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))
@@ -197,19 +199,19 @@ def rotation() -> Array:
 
 def test_parts_anywhere_in_space_have_the_same_gaps(tmp_path: Path) -> None:
     """Three displacements per node, those in the surface held by springs of their own."""
-    R, parts, moved = rotation(), [], np.array([3e3, -2e3, 500.0])
+    R, parts = rotation(), []
     turn = np.kron(np.eye(45), R)  # of local displacements to global ones
     for name, K in zip("ab", stiffnesses(JOINT), strict=True):
         local = np.diag(np.tile([1e3, 2e3, 0.0], 45))
         local[2::3, 2::3] = K
-        xyz = flat(JOINT.nodes) @ R.T + moved
+        xyz = flat(JOINT.nodes) @ R.T + MOVED
         normals = np.tile(R[:, 2], (45, 1))
         whole = turn @ local @ turn.T
         parts.append(write_part(tmp_path, name, (whole + whole.T) / 2, xyz, normals, dofs=[1, 2, 3]))
     axes = scene_from(parts).joint.axes
 
     def there(x: float, y: float) -> list[float]:
-        return (axes @ (R @ [x, y, 0.0] + moved))[:2].tolist()
+        return (axes @ (R @ [x, y, 0.0] + MOVED))[:2].tolist()
 
     def turned(effect: Tables) -> Tables:
         points = [[*there(*point[:2]), *point[2:]] for point in effect["points"]]
@@ -262,18 +264,20 @@ def cylinder(radius: float, angles: Array, y: Array) -> tuple[Array, Array]:
     return radius * normals + np.column_stack([np.zeros_like(A), Y, np.zeros_like(A)]), normals
 
 
+def cylinders(folder: Path, end: float, R: Array, moved: Array) -> list[Tables]:
+    """Concentric ones on springs, a up to an angle and b beyond it, both turned and then moved."""
+    parts = []
+    for name, radius, last, lines in (("a", 200.0, end, 25), ("b", 202.0, end + 0.1, 41)):
+        xyz, normals = cylinder(radius, np.linspace(-last, last, lines), np.linspace(0.0, 50.0, 6))
+        K, xyz, normals = 40.0 * np.eye(3 * len(xyz)), xyz @ R.T + moved, normals @ R.T
+        parts.append(write_part(folder, name, K, xyz, normals, dofs=[1, 2, 3]))
+    return parts
+
+
 def test_contacts_of_curved_surfaces_are_along_their_normals(tmp_path: Path) -> None:
-    """Concentric cylinders on radial springs: a pressure on the inner one, by its area, is shared evenly."""
-    y, parts, k = np.linspace(0.0, 50.0, 6), [], 40.0
-    for name, radius, angles in (
-        ("a", 200.0, np.linspace(-0.6, 0.6, 25)),
-        ("b", 202.0, np.linspace(-0.7, 0.7, 41)),
-    ):
-        xyz, normals = cylinder(radius, angles, y)
-        parts.append(write_part(tmp_path, name, k * np.eye(3 * len(xyz)), xyz, normals, dofs=[1, 2, 3]))
-    scene = scene_from(
-        parts, {"kind": "initial_gap", "mean": 0.1}, {"kind": "pressure", "part": "a", "value": 1.0}
-    )
+    """A pressure on the inner one of two cylinders, by its area, is shared evenly."""
+    gap, load = {"kind": "initial_gap", "mean": 0.1}, {"kind": "pressure", "part": "a", "value": 1.0}
+    scene = scene_from(cylinders(tmp_path, 0.6, np.eye(3), np.zeros(3)), gap, load)
     joint, A = scene.joint, prepared(scene).assembly.A
     np.testing.assert_allclose(joint.pairings["a", "b"].apart, 2.0, atol=0.04)  # chords of b
     assert joint.areas("a").reshape(-1, 3).shape == (150, 3)
@@ -289,15 +293,7 @@ def test_contacts_of_curved_surfaces_are_along_their_normals(tmp_path: Path) -> 
 
 def test_a_part_off_its_place_moves_as_a_rigid_body_along_inclined_normals(tmp_path: Path) -> None:
     """By Aᵀx of the motion of all its nodes; a shift by the cosine of each normal, half of it at 60°."""
-    R, y, parts, end = rotation(), np.linspace(0.0, 50.0, 6), [], np.pi / 3
-    for name, radius, angles in (
-        ("a", 200.0, np.linspace(-end, end, 25)),
-        ("b", 202.0, np.linspace(-end - 0.1, end + 0.1, 41)),
-    ):
-        xyz, normals = cylinder(radius, angles, y)
-        xyz, normals = xyz @ R.T + [3e3, -2e3, 500.0], normals @ R.T
-        parts.append(write_part(tmp_path, name, np.eye(3 * len(xyz)), xyz, normals, dofs=[1, 2, 3]))
-    joint = scene_from(parts).joint
+    joint = scene_from(cylinders(tmp_path, np.pi / 3, rotation(), MOVED)).joint
     A, axes = joint.contact_matrix(), joint.axes
     places = [part.nodes.xyz @ axes.T for part in joint.parts]
     centre = np.array([np.vstack(places).min(axis=0), np.vstack(places).max(axis=0)]).mean(axis=0)
@@ -396,15 +392,10 @@ def test_a_tool_and_a_third_part(tmp_path: Path) -> None:
     parts = [write_part(tmp_path, name, K[0], flat(JOINT.nodes)) for name in "abc"]
     gap, tool = {"kind": "initial_gap", "mean": 0.1}, {"kind": "rigid_tool", "part": "c", "distance": 0.2}
     theirs = solved(scene_from(parts, gap, tool, FASTENERS | {"between": ["a", "b"]}))
-    table = JOINT.model_dump(exclude_unset=True)
-    same = [table["part"][0] | {"name": name} for name in "abc"]
-    ours = solved(
-        scene_of(
-            {"joint": table | {"part": same}, "effect": [gap, tool, FASTENERS | {"between": ["a", "b"]}]}
-        )
-    )
+    same = tuple(JOINT.part[0].model_copy(update={"name": name}) for name in "abc")
+    joint = JOINT.model_copy(update={"part": same})
+    ours = solved(scene_of({"joint": joint, "effect": [gap, tool, FASTENERS | {"between": ["a", "b"]}]}))
     np.testing.assert_allclose(theirs.gap, ours.gap, rtol=0, atol=1e-12)
-    assert make_scene(JOINT).joint.size == (90, 45)
 
 
 def test_the_key_is_that_of_what_the_files_hold(tmp_path: Path) -> None:
