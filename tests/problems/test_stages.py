@@ -18,12 +18,11 @@ from problems.build import adopts_model, load_case, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
 from problems.forms import Form
-from problems.forms.assembly import Matrix
 from problems.load_cases.sweep import keys_of
 from problems.model.fastener_forces import fastener_forces
 from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene
-from problems.model.stage_answers import Elongations, locked, stage_scenes, through
+from problems.model.stage_answers import stage_scenes
 from problems.scene_files import read_scene
 
 
@@ -188,31 +187,6 @@ def test_what_the_last_stage_sets_is_in_its_problem() -> None:
     for spring, weights in zip(springs, W, strict=True):
         np.testing.assert_allclose(spring.approach, weights @ (a - b), atol=1e-9)
     assert answer.stages[-1].forces["rivets"] == pytest.approx(0.0, abs=1e-4)
-
-
-def test_many_cases_go_through_at_once() -> None:
-    """Each load case locks approaches of its own."""
-    scene = joined(
-        [CLAMP, {"name": "1", "on": ["rivets[0:2]"]}, RELEASE, {"name": "2", "on": ["rivets[2:4]"]}]
-    )
-
-    def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, int]:
-        answers = [solve(heavier(locked(part, column), k)).x for k, column in enumerate(approaches.T)]
-        return lambda T: T.T @ np.column_stack(answers), approaches.shape[1]
-
-    def solved_alone(part: JointScene) -> tuple[Elongations, int]:
-        x = solve(part).x
-        return lambda T: T.T @ x, 0
-
-    def heavier(part: JointScene, k: int) -> JointScene:
-        gap = part.effects[0].model_copy(update={"mean": 0.5 + 0.1 * k})
-        return replace(part, effects=(gap, *part.effects[1:]))
-
-    *_, (_, _, both, _) = through(scene, solved, 2)
-    for k in range(2):
-        *_, (_, _, one, _) = through(heavier(scene, k), lambda part, at: solved_alone(locked(part, at[:, 0])))
-        np.testing.assert_allclose(both[:, k], one[:, 0], atol=1e-10)
-    assert abs(np.diff(both)).max() > 0.01
 
 
 def test_stages_share_the_stiffness_that_they_have_in_common() -> None:
