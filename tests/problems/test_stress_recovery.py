@@ -226,14 +226,12 @@ points = [[10.0, 5.0]]
 
 
 @pytest.mark.usefixtures("without_pictures")
-@pytest.mark.parametrize(("allowed", "code", "word"), [(1e4, 0, "PASS"), (1e-4, 4, "FAIL")])
-def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str) -> None:
+def test_an_allowed_stress(tmp_path: Path) -> None:
     S = np.vstack([GOOD[:3] * [[1], [0], [0]], GOOD[:3] * [[3], [0], [0]]])
     point_matrix(tmp_path, S, TWO)
     (tmp_path / "j.toml").write_text(TOML, "utf-8")
-    done = harness("solve", tmp_path / "j.toml", "--allow-stress", allowed, "--out", tmp_path / "out")
-    assert done.exit_code == code, done.output
-    assert word in done.output
+    done = harness("solve", tmp_path / "j.toml", "--allow-stress", 1e-4, "--out", tmp_path / "out")
+    assert (done.exit_code, "FAIL" in done.output) == (4, True), done.output
     answer = (tmp_path / "out/answer.md").read_text("utf-8")
     assert "a, on the bottom, x = 1 mm, y = 2 mm" in answer
     assert "none known of b" in answer
