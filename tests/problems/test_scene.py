@@ -54,15 +54,11 @@ def test_key_does_not_depend_on_how_the_file_is_written(path: Path) -> None:
 LOADS = [
     ("mean = 0.4", "mean = 0.40001"),
     ("seed = 7", "seed = 8"),
-    ("preload = 60.0", "preload = 59.0"),
     ("[50.0, 30.0]", "[50.0, 31.0]"),
 ]
 STRUCTURE = [
-    ("thickness = 3.0", "thickness = 3.1"),
-    ("length = 400.0", "length = 400.5"),
     ("nodes = [9, 5]", "nodes = [9, 6]"),
     ("elements = 2", "elements = 3"),
-    ("I = 2e3", "I = 2e3\nJ = 1.0"),
     ("lines = [60.0]", "lines = [61.0]"),
     ("thickness = 3.0", "thickness = 3.0\npoisson = 0.3"),
 ]
