@@ -95,14 +95,14 @@ def test_labels_say_which_row_is_which(format: str, kept: float, tmp_path: Path)
     assert error < (1e-6 if kept else 1e-9)
 
 
-ROWS = {"table": (0, [3]), "ids": (1, [3]), "directions": (2, [1, 2, 3])}
+ROWS = {"table": [3], "ids": [3], "directions": [1, 2, 3]}
 
 
 @pytest.mark.parametrize("order", ROWS)
 def test_rows_without_labels_are_as_the_scene_says(order: str, tmp_path: Path) -> None:
     """Ids and places in another order than the rows of K: asked; the gaps of the built-in joint; and an
     order that does not fit K is told."""
-    others, dofs = np.random.default_rng(4).permutation(45), ROWS[order][1]
+    others, dofs = np.random.default_rng(4).permutation(45), ROWS[order]
     K = [np.kron(np.diag([0.0] * (len(dofs) - 1) + [1.0]), one) for one in stiffnesses(JOINT)]
     parts = []
     for name, one in zip("ab", K, strict=True):
@@ -170,13 +170,9 @@ def error_of_other_meshes(folder: Path, elements: int) -> float:
     a, b = stiffnesses(fine)
     far = stiffnesses(other)[1]
     first = write_part(folder, "a", a, flat(fine.nodes))
+    seconds = write_part(folder, "b", b, flat(fine.nodes)), write_part(folder, "c", far, flat(other.nodes))
     effects = {"kind": "initial_gap", "mean": 0.2}, PRESSURE | {"value": -6e-4}
-    same = solved(scene_from([first, write_part(folder, "b", b, flat(fine.nodes))], *effects))
-    away = solved(
-        scene_from(
-            [first, write_part(folder, "c", far, flat(other.nodes))], *effects[:1], effects[1] | {"part": "c"}
-        )
-    )
+    same, away = (solved(scene_from([first, second | {"name": "b"}], *effects)) for second in seconds)
     assert 0 < (same.lam > 0).sum() < len(same.lam)
     return float(abs(same.gap - away.gap).max())
 
@@ -423,13 +419,8 @@ def test_unknowns_off_the_contact_surface_and_rotations_are_solved_for(tmp_path:
     rows = {"dofs": [3, 4, 5], "contact": [1] * 45 + [0] * 3}
     large = write_part(tmp_path, "a", whole, nodes, **rows)
     small = write_part(tmp_path, "c", (condensed + condensed.T) / 2, flat(JOINT.nodes)) | {"name": "a"}
-    effects = (
-        measured(JOINT),
-        FASTENERS,
-        INSTALLED,
-        PRESSURE,
-        {"kind": "pressure", "part": "a", "value": 1e-3},
-    )
+    other_side = {"kind": "pressure", "part": "a", "value": 1e-3}
+    effects = measured(JOINT), FASTENERS, INSTALLED, PRESSURE, other_side
     one, other = (solved(scene_from([part, *more], *effects)) for part in (large, small))
     assert len(one.x) == 144 + 45
     np.testing.assert_allclose(one.gap, other.gap, rtol=0, atol=1e-9)
@@ -438,11 +429,10 @@ def test_unknowns_off_the_contact_surface_and_rotations_are_solved_for(tmp_path:
 
 
 def test_a_free_part_with_rotations_is_told_by_its_six_motions(tmp_path: Path) -> None:
-    nodes = np.random.default_rng(3).uniform(0, 100, (12, 3))
-    write_part(tmp_path, "a", np.eye(72), nodes, dofs=[1, 2, 3, 4, 5, 6])
-    part = scene_from([write_part(tmp_path, "a", np.eye(72), nodes, dofs=[1, 2, 3, 4, 5, 6])]).joint.parts[0]
+    nodes, dofs = np.random.default_rng(3).uniform(0, 100, (12, 3)), [1, 2, 3, 4, 5, 6]
+    part = scene_from([write_part(tmp_path, "a", np.eye(72), nodes, dofs=dofs)]).joint.parts[0]
     Q, _ = np.linalg.qr(part.rigid)
-    free = write_part(tmp_path, "b", 1e4 * (np.eye(72) - Q @ Q.T), nodes, dofs=[1, 2, 3, 4, 5, 6])
+    free = write_part(tmp_path, "b", 1e4 * (np.eye(72) - Q @ Q.T), nodes, dofs=dofs)
     (fault,) = refusal_of(lambda: prepared(scene_from([free]))).faults
     assert str(fault.value).count("translation along") == str(fault.value).count("rotation about") == 3
     assert not part.free.size
