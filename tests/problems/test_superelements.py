@@ -63,12 +63,8 @@ def built_in_answer() -> Solution:
     return solved(built_in(*EFFECTS))
 
 
-@pytest.mark.parametrize("format", ["npz", "mtx", "op4", "abaqus"])
-def test_the_built_in_joint_as_superelements_has_its_answer(format: str, tmp_path: Path) -> None:
-    if format == "op4":
-        pytest.importorskip("pyyeti")
-    parts = write_plates(tmp_path, JOINT, format=format)
-    ours, theirs = built_in_answer(), solved(scene_from(parts, *EFFECTS))
+def test_the_built_in_joint_as_superelements_has_its_answer(tmp_path: Path) -> None:
+    ours, theirs = built_in_answer(), solved(scene_from(write_plates(tmp_path, JOINT), *EFFECTS))
     assert 0 < (ours.lam > 0).sum() < len(ours.lam)
     for name in ("x", "gap"):
         np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1e-12)
