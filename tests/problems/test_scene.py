@@ -183,9 +183,7 @@ def test_a_fault_in_the_assembly_names_the_assembly_file(path: Path) -> None:
         ('[matrices]\nproblem = "scene.toml"\nK = "scene.toml"', "matrices", "or problem alone"),
     ],
 )
-def test_a_file_that_is_no_scene_has_one_fault(
-    path: Path, content: str | bytes, key: str, said: str
-) -> None:
+def test_a_file_that_is_no_scene_has_one_fault(path: Path, content: str | bytes, key: str, said: str) -> None:
     (fault,) = faults(path, content)
     assert (fault.where, fault.key) == (str(path), key)
     assert said in str(fault)

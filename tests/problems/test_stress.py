@@ -302,5 +302,3 @@ def test_a_scene_asks_for_stresses(tmp_path: Path) -> None:
     assert read_scene(str(tmp_path / "asked.toml")).key == read_scene("gallery/heavy-sheet-on-tool").key
     done = harness("solve", tmp_path / "asked.toml", "--out", tmp_path / "a")
     assert "Largest von Mises stress 2.13 N/mm², sheet" in done.output.replace("\n", " ")
-
-
