@@ -36,23 +36,12 @@ def condense(
     reporter: Reporter = SILENT,
     part: str = "",
 ) -> Matrix:
-    """Schur complement of a block-tridiagonal K on the kept unknowns.
+    """Schur complement (k, k) of a block-tridiagonal K (N, N) on the unknowns to keep (N,).
 
-    Parameters
-    ----------
-    K : (N, N) symmetric positive definite, coupling only within a line and to the next.
-    lines : the unknowns of each line, in their order.
-    keep : (N,) bool.
-    part : the part's name for the reporter.
+    K couples only within a line and to the next. lines : the unknowns of each line. part : the part's name
+    for the reporter. S is dense, by columns, symmetric to the last bit, and in the order of `lines`.
 
-    Returns
-    -------
-    (k, k) dense, by columns, symmetric to the last bit, in the order in which the kept unknowns stand in
-    `lines`.
-
-    Raises
-    ------
-    NotPositiveDefinite : a pivot block is not positive definite: some motion costs no energy.
+    Raises NotPositiveDefinite if some motion costs no energy.
     """
     nothing = np.zeros(0, dtype=np.intp)
     split = [np.concatenate([line[keep[line]], line[~keep[line]]]) for line in (nothing, *lines, nothing)]

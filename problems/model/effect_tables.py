@@ -36,8 +36,8 @@ class EffectTable:
     """An [[effect]] table at a place in a file, the effect made of it, and the rows of its CSV file.
 
     effect : None if the table is invalid. If the CSV has bad rows, the effect is made of the good ones, so
-    that these and the other parameters are still checked. of_points : the lines and the stages of the points
-    of an effect that was read before.
+    that these and the other parameters are still checked. of_points : the lines and the stages of its points
+    in their file.
     """
 
     where: Path
@@ -75,6 +75,8 @@ class EffectTable:
             options = TableOptions(tuple(names.get(name, name) for name in wanted), tuple(missing), skip)
             optional = [name for name in effect.more_columns if name not in names]
             self.rows = read_columns(self.where.parent / str(content["file"]), wanted, options, optional)
+            lines = tuple(f"{self.rows.path.name}, line {line}" for line in self.rows.lines)
+            self.of_points = lines, tuple(self.rows.words["stage"])
             yield from self._unread(effect, options.columns)
             content = {key: value for key, value in content.items() if key not in (*FILE_KEYS, "file")}
             count = len(effect.columns)
@@ -93,9 +95,6 @@ class EffectTable:
             elif stages:
                 allowed = f"{len(stages)} points: the column stage of its file has as many"
                 yield from self._located(iter([("points", f"{count} points", allowed)]))
-            if self.rows:
-                self.effect._lines = tuple(f"{self.rows.path.name}, line {line}" for line in self.rows.lines)
-                self.effect._stages = tuple(self.rows.words["stage"])
         except ValidationError as error:
             faults = validation_faults(self.where, effect, error, self._name)
             keys = ((fault.key.removeprefix(self._name).lstrip("."), fault) for fault in faults)

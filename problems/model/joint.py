@@ -111,7 +111,6 @@ class Joint(Table):
 
     @property
     def size(self) -> tuple[int, int]:
-        """(n, m) of the quadratic program."""
         return len(self.part) * self.node_count, len(self.pairs) * self.node_count
 
     @property
@@ -141,11 +140,7 @@ class Joint(Table):
         return Grid(self.x, self.y)
 
     def weights(self, points: Matrix) -> sp.csr_array:
-        """W (k, node_count) of points (k, 2), mm, bilinear on each element.
-
-        Wv are the values at the points of a field with the values v at the junction nodes. Wᵀp are nodal
-        forces with the resultant and the moments of forces p at the points.
-        """
+        """W (k, node_count) of points (k, 2), mm, bilinear on each element; see `surface`."""
         return self.surface.weights(points)
 
     def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
@@ -163,12 +158,10 @@ class Joint(Table):
         return self.surface.areas
 
     def unknowns(self, part: str) -> slice:
-        """The part's displacements, as a slice of x."""
         index = self.names.index(part)
         return slice(index * self.node_count, (index + 1) * self.node_count)
 
     def span(self, pair: Pair) -> slice:
-        """The contacts of a pair, as a slice of g and λ."""
         start = self.pairs.index(pair) * self.node_count
         return slice(start, start + self.node_count)
 
@@ -218,7 +211,6 @@ class Joint(Table):
         return Plate(self.x, np.concatenate(y), part.thickness, part.young, part.poisson)
 
     def faults(self) -> Faults:
-        """Yield the faults that the types cannot catch."""
         for part in self.part:
             for edge in part.clamped:
                 if getattr(part, edge) is None:
@@ -226,7 +218,6 @@ class Joint(Table):
         yield from wrong_contacts(self.names, self.contacts, self.pairs)
 
     def unusual(self) -> Faults:
-        """Yield values that are possible but rarely meant: key, value, what is usual."""
         length, width = self.junction.length, self.junction.width
         if max(length, width) < SHORT:
             yield "junction.length", length, f"at least {SHORT:g} mm: are these metres?"

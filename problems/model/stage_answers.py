@@ -29,24 +29,15 @@ Elongations: TypeAlias = Callable[[sp.csc_array], Matrix]
 def through(
     scene: JointScene, solve: Callable[[JointScene, Matrix], tuple[Elongations, Answer]], cases: int = 1
 ) -> Iterator[tuple[str, JointScene, Matrix, Answer]]:
-    """Go through the stages of a scene, one after another.
+    """Go through the stages of a scene, one after another; a scene without stages is one.
 
-    Parameters
-    ----------
-    scene : JointScene
-        With stages; without, it is one stage.
-    solve : function
-        Answers a scene without stages whose springs have the approaches (r, cases), mm: returns the function
-        from T to Tᵀx, called if fasteners lock their approach, and the answer to hand on.
-    cases : int
-        The number of load cases. Each has approaches of its own.
+    solve : answers a scene without stages whose springs have the approaches (r, cases), mm. It returns the
+    function from T to Tᵀx, called if fasteners lock their approach, and the answer to hand on.
+    cases : the number of load cases. Each has approaches of its own.
 
-    Yields
-    ------
-    (str, JointScene, array (r, cases), answer)
-        A stage: its name; what acts at its end, a scene without stages; the approaches of its springs, mm,
-        see `locked`; and its answer. A stage is solved again with the fasteners that it sets if these have a
-        preload, or if it is the last one.
+    Yields the name of a stage; what acts at its end, a scene without stages; the approaches of its springs,
+    mm, see `locked`; and its answer. A stage is solved again with the fasteners that it sets if these have a
+    preload, or if it is the last one.
     """
     joint, locks = scene.joint, _given_approaches(scene, cases)
 

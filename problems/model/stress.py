@@ -63,18 +63,8 @@ def part_stress(
 ) -> PartStress:
     """The stresses of a part.
 
-    Parameters
-    ----------
-    name : str
-        Of the part.
-    model : PartModel
-        Its plate and pads.
-    loads : sequence of PartLoadEffect
-        Those of its loads that may bend it without stress.
-    u : (model.plate.size,) array
-        All of its unknowns, zero where it is built in.
-    forces : (k, 2) array
-        The places of forces at points, mm.
+    loads : those of its loads that may bend it without stress. u (model.plate.size,) : all of its unknowns,
+    zero where it is built in. forces (k, 2) : the places of forces at points, mm.
     """
     plate, W = model.plate, u.reshape(2 * len(model.plate.y), 2 * len(model.plate.x))
     (x, hx, at_x), (y, hy, at_y) = _line(plate.x), _line(plate.y)

@@ -111,7 +111,6 @@ class SuperelementModel:
 
     @property
     def built(self) -> bool:
-        """Whether every dense matrix is in the cache; computes nothing."""
         return (not self.springs or storage.load(self._key) is not None) and self.dense().built
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:

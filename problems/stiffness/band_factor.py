@@ -112,8 +112,7 @@ def rounded_factor(K: sp.csc_array, width: int, dtype: type[np.floating[Any]]) -
 def band_cholesky(band: Matrix) -> tuple[Matrix, int]:
     """L (b + 1, N) of a symmetric band, which it replaces, and dpbtrf's info.
 
-    On one thread up to b = 700: a second one makes it 1.2 to 4 times slower at b = 80 to 420, as its steps
-    are small, and takes 0.88, 0.64 and 0.57 of the time at 780, 1200 and 2273.
+    On one thread up to b = 700: a second one makes narrow bands up to 4 times slower, as the steps are small.
     """
     with nullcontext() if len(band) > WIDE else _threads().limit(limits=1):
         L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)

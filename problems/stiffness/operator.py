@@ -24,11 +24,8 @@ COLUMNS_AT_A_TIME = 64  # of K⁻¹A
 class Stiffness:
     """K (n, n), N/mm, symmetric positive definite.
 
-    Parameters
-    ----------
-    blocks : its diagonal blocks.
-    factor : makes their factors when K⁻¹ is first needed; by default `factor_blocks`. It may take them from a
-        cache, or name the scene in its errors.
+    blocks : its diagonal blocks. factor : makes their factors when K⁻¹ is first needed; by default
+    `factor_blocks`. It may take them from a cache, or name the scene in its errors.
     """
 
     def __init__(self, blocks: Sequence[Block], factor: Callable[[Stiffness], object] | None = None) -> None:

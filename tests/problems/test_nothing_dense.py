@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from commands import harness
 from scipy.sparse.linalg import spsolve
 from small_joints import two_parts
-from sparse_matrices import band_matrix, renumbered
+from sparse_matrices import band_matrix, chain, renumbered
 
 from harness import LoadCase, judge, load_scene, own_matrices, solve, solve_series
 from harness.planning import form_choice
@@ -31,6 +31,7 @@ from problems.scene_files import read_scene
 from problems.stiffness.dense_block import DenseBlock
 
 N, M = 3000, 400
+HELD_CHAIN = sp.csc_array(chain(N) + 2 * sp.eye_array(N))
 NODES = (200, 8)
 SCENE = f"""
 {two_parts(3000.0, 105.0, NODES, "south")}
@@ -176,9 +177,8 @@ def test_tens_of_thousands_of_separate_unknowns_are_solved() -> None:
 
 
 def test_a_series_and_a_judgement_of_an_own_sparse_K_make_nothing_dense() -> None:
-    K = sp.diags_array([np.full(N, 4.0), -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], format="csc")
     A, f, g = sp.eye_array(N, M, format="csc"), np.linspace(9.0, 0.0, N), np.ones(M)
-    scene = own_matrices(K, A, f, g)
+    scene = own_matrices(HELD_CHAIN, A, f, g)
     x = solve(scene).x
     (result,) = solve_series(scene, [LoadCase(f, g)])
     assert result.row["verdict"] == "within"
@@ -187,9 +187,7 @@ def test_a_series_and_a_judgement_of_an_own_sparse_K_make_nothing_dense() -> Non
 
 
 def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path) -> None:
-    ends = np.array([1.0, *[2.0] * (N - 2), 1.0])
-    chain = sp.diags_array([ends, -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], shape=(N, N))
-    K = sp.csc_array(chain + 1e-15 * sp.eye_array(N))
+    K = sp.csc_array(chain(N) + 1e-15 * sp.eye_array(N))
     code, said = run("import", *files(tmp_path, K), "--out", str(tmp_path / "mine.npz"))
     assert code == 2
     assert "K.mtx" in said
@@ -197,23 +195,17 @@ def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path
     assert not (tmp_path / "mine.npz").exists()
 
 
-def test_a_large_sparse_K_is_sparse_in_an_op4_file(tmp_path: Path) -> None:
-    K = sp.diags_array([np.full(N, 4.0), -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], format="csr")
-    data = {"K": K, "A": sp.eye_array(N, M, format="csc"), "f": np.ones(N), "g": np.ones(M)}
-    formats.FORMATS["op4"].write(tmp_path / "p.op4", data)
-    found = formats.read_labelled(tmp_path / "p.op4")
-    for name in "KA":
-        matrix, _ = found[name]
-        assert sp.issparse(matrix)
-        assert abs(sp.csr_array(matrix) - data[name]).max() == 0
-
-
-def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:
-    op4 = pyyeti(tmp_path).op4
-    K = band_matrix(np.random.default_rng(2), 50, 2)
-    path, f = tmp_path / "k.op4", np.arange(50.0)[:, None]
-    op4.OP4().write(str(path), {"k": sp.csc_matrix(K), "f": sp.csc_matrix(f)}, binary=True, sparse="bigmat")
-    found = {name: matrix for name, (matrix, _) in formats.read_labelled(path).items()}
-    assert sp.issparse(found["K"])
-    np.testing.assert_array_equal(found["K"].toarray(), K.toarray())
-    np.testing.assert_array_equal(formats.vector(found["f"]), f.ravel())
+def test_sparse_matrices_of_op4_files_stay_sparse(tmp_path: Path) -> None:
+    """Of a file that is written here, and of one of pyyeti's, in which f is sparse, too."""
+    ours, theirs, f = tmp_path / "ours.op4", tmp_path / "theirs.op4", np.arange(float(N))
+    data = {"K": HELD_CHAIN, "A": sp.eye_array(N, M, format="csc"), "f": f, "g": np.ones(M)}
+    formats.FORMATS["op4"].write(ours, data)
+    sparse = {"k": data["K"], "a": data["A"], "f": f[:, None]}
+    written = {name: sp.csc_matrix(matrix) for name, matrix in sparse.items()}
+    pyyeti(theirs).op4.OP4().write(str(theirs), written, binary=True, sparse="bigmat")
+    for path in (ours, theirs):
+        found = {name: matrix for name, (matrix, _) in formats.read_labelled(path).items()}
+        for name in "KA":
+            assert sp.issparse(found[name])
+            assert abs(sp.csr_array(found[name]) - data[name]).max() == 0
+        np.testing.assert_array_equal(formats.vector(found["f"]), f)

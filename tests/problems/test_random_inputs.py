@@ -181,16 +181,11 @@ def test_a_truth_value_is_no_number_to_draw(tmp_path: Path) -> None:
 BAD = [
     ("fasteners.preload=normal(60, 12)", "must be greater than 0"),  # its 1e-9 quantile is below 0
     ("fasteners.preload=normal(60, -5)", "a scale above 0"),
-    ("fasteners.preload=normal(60, 5, 1)", "norm(loc=0, scale=1)"),
     ("fasteners.preload=lognorm()", "lognorm(s, loc=0, scale=1)"),
-    ("fasteners.preload=weibull_min(-1)", "weibull_min(c, loc=0, scale=1)"),
     ("fasteners.preload=norml(60, 5)", "did you mean norm"),
     ("fasteners.preload=binom(3, 0.5)", "no such distribution"),
     ("fasteners.preload=60", "[each] NAME(PARAMETERS)"),
-    ("fasteners.preload=normal(1e999, 1)", "all finite"),
-    ("fasteners.preload=normal(mean, 1)", "[each] NAME(PARAMETERS)"),
     ("fasteners.preload=expon(loc=60, scale=1, scale=2)", "[each] NAME(PARAMETERS)"),
-    ("fasteners.preload=norminvgauss(1, 2, 60, 1)", "norminvgauss(a, b, loc=0, scale=1)"),
     ("fasteners.preload=0 of normal(60, 5)", "[each] NAME(PARAMETERS)"),
     (f"fasteners.preload={'9' * 5000} of normal(60, 5)", "[each] NAME(PARAMETERS)"),
     ("fasteners.points.x=normal(0, 20)", "on the junction"),

@@ -54,15 +54,11 @@ def test_key_does_not_depend_on_how_the_file_is_written(path: Path) -> None:
 LOADS = [
     ("mean = 0.4", "mean = 0.40001"),
     ("seed = 7", "seed = 8"),
-    ("preload = 60.0", "preload = 59.0"),
     ("[50.0, 30.0]", "[50.0, 31.0]"),
 ]
 STRUCTURE = [
-    ("thickness = 3.0", "thickness = 3.1"),
-    ("length = 400.0", "length = 400.5"),
     ("nodes = [9, 5]", "nodes = [9, 6]"),
     ("elements = 2", "elements = 3"),
-    ("I = 2e3", "I = 2e3\nJ = 1.0"),
     ("lines = [60.0]", "lines = [61.0]"),
     ("thickness = 3.0", "thickness = 3.0\npoisson = 0.3"),
 ]
@@ -116,6 +112,7 @@ BAD = [
     ),
     (('clamped = ["north"]', ""), "part.a", "no support", "clamped edge"),
     (('title = "a strip"', 'titel = "a strip"'), "titel", "a strip", "no such key"),
+    (('title = "a strip"', "output = { stres = true }"), "output.stres", True, "did you mean stress?"),
     (
         ('title = "a strip"', 'assembly = "wing-fragment-4387"'),
         "assembly",
@@ -171,24 +168,25 @@ def test_a_fault_in_the_assembly_names_the_assembly_file(path: Path) -> None:
     assert fault.key == "part.0.thickness"
 
 
-@pytest.mark.parametrize("text", ["a = = 3", '[effect\nkind="x"', 'title = "no end'])
-def test_malformed_toml(path: Path, text: str) -> None:
-    (fault,) = faults(path, text)
-    assert (fault.where, fault.key) == (str(path), "TOML")
-
-
 @pytest.mark.parametrize(
-    ("content", "key", "value"),
+    ("content", "key", "said"),
     [
+        ("a = = 3", "TOML", "valid TOML"),
         ('title = "a"'.encode("utf-16"), "file", "UTF-16 text"),
         ('title = "a"'.encode("utf-16-be"), "file", "UTF-16 text"),
         ('title = "a"'.encode("utf-32"), "file", "UTF-32 text"),
-        (b'title = "a"\r\nx = "\xb5m"', "line 2", "byte \\xb5, not UTF-8"),
+        (b'title = "a"\r\nx = "\xb5m"', "line 2", "xb5, not UTF-8"),
+        ('assembly = "wing-fragment-4386"\neffect = { kind = "pressure" }', "effect", "tables [[effect]]"),
+        ('assembly = "wing-fragment-4386"\neffect = ["initial_gap"]', "effect", "tables [[effect]]"),
+        ("matrices = 3", "matrices", "a table [matrices]"),
+        ('[matrices]\nK = "scene.toml"', "matrices", "K, A, f and g, or problem alone"),
+        ('[matrices]\nproblem = "scene.toml"\nK = "scene.toml"', "matrices", "or problem alone"),
     ],
 )
-def test_other_encodings_are_named(path: Path, content: bytes, key: str, value: str) -> None:
+def test_a_file_that_is_no_scene_has_one_fault(path: Path, content: str | bytes, key: str, said: str) -> None:
     (fault,) = faults(path, content)
-    assert (fault.key, fault.value) == (key, value)
+    assert (fault.where, fault.key) == (str(path), key)
+    assert said in str(fault)
 
 
 @pytest.mark.parametrize(
@@ -204,27 +202,6 @@ def test_a_backslash_in_a_path_is_named_as_the_cause(path: Path, text: str) -> N
     said = "\n".join(map(str, faults(path, text)))
     assert "a backslash in TOML's double quotes begins an escape" in said
     assert "\t" not in said
-
-
-@pytest.mark.parametrize("value", ['{ kind = "initial_gap", mean = 0.6 }', "3", '["initial_gap"]', "[3]"])
-def test_effect_must_be_tables(path: Path, value: str) -> None:
-    (fault,) = faults(path, f'assembly = "wing-fragment-4386"\neffect = {value}\n')
-    assert fault.key == "effect"
-    assert "[[effect]]" in fault.allowed
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "matrices = 3",
-        "[matrices]",
-        '[matrices]\nproblem = "scene.toml"\nK = "scene.toml"',
-        '[matrices]\nK = "scene.toml"',
-    ],
-)
-def test_matrices_must_be_complete(path: Path, text: str) -> None:
-    (fault,) = faults(path, text)
-    assert (fault.where, fault.key) == (str(path), "matrices")
 
 
 def test_matrices_with_an_unknown_key_and_a_missing_file(path: Path) -> None:

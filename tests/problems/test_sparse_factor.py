@@ -1,6 +1,7 @@
 """Factors of a sparse K, each against the dense matrix, and what they say of a mechanism."""
 
 import re
+from functools import reduce
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -125,26 +126,14 @@ def test_the_size_of_a_factor_is_known_before_it_is_made(monkeypatch: pytest.Mon
         block = sparse_block(K, where)
         assert block.factor_nonzeros == sum(array.size for array in block.factor())
     for shape in ((290, 280), (25, 24, 23)):
-        K = renumbered(grid(*shape), random.permutation(int(np.prod(shape))))
-        block = sparse_block(K)
+        n = int(np.prod(shape))
+        differences = reduce(sp.kronsum, map(chain, reversed(shape)))  # of neighbours on the grid
+        block = sparse_block(renumbered(differences + 0.01 * sp.eye_array(n), random.permutation(n)))
         assert isinstance(block, GeneralBlock)
         monkeypatch.setattr(GeneralBlock, "make_factor", staticmethod(SuperLU))  # the other does not tell
         expected = block.factor_nonzeros
         block.factor()
         assert expected / 2.5 < 1.5 * block.factor_nonzeros < 2.5 * expected
-
-
-def grid(*shape: int) -> sp.csc_array:
-    """The differences of each point from its neighbours on a grid, and a little more."""
-    K = 0.01 * sp.eye_array(int(np.prod(shape)), format="csc")
-    for axis, n in enumerate(shape):
-        path = sp.csc_array(chain(n))
-        for other, size in enumerate(shape):
-            if other != axis:
-                unit = sp.eye_array(size)
-                path = sp.csc_array(sp.kron(unit, path) if other < axis else sp.kron(path, unit))
-        K = K + path
-    return sp.csc_array(K)
 
 
 @pytest.mark.usefixtures("library")

@@ -21,7 +21,6 @@ from problems.model.effect import Effect
 from problems.model.effect_tables import effect_class
 from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
-from problems.scene_files import read_scene, scene_names
 from problems.stiffness.band_factor import half_bandwidth
 from problems.stiffness.banded_block import BandedBlock
 from problems.stiffness.dense_block import DenseBlock
@@ -82,12 +81,6 @@ def test_the_compliance_of_windows_of_contacts(seed: int) -> None:
         assert (abs(window - Q[np.ix_(W, W)]) <= 4 * SINGLE * np.outer(scale[W], scale[W])).all()
         part = W[: len(W) // 2 + 1]
         np.testing.assert_array_equal(near(part), window[: len(part), : len(part)])
-
-
-def test_without_a_band_there_is_none() -> None:
-    K = graph_matrix(np.random.default_rng(3), 800)
-    A = sp.csc_array(sp.eye_array(800, 5))
-    assert Stiffness.of(K).local_compliance(A, [np.arange(5)]) is None
 
 
 @pytest.mark.parametrize(
@@ -174,18 +167,6 @@ def test_the_compliance_is_nearly_the_same_and_no_larger(name: str) -> None:
     ratio = sla.eigh(near, Q, eigvals_only=True)
     assert 1 - 2e-3 <= ratio[0] < 1 - 1e-6
     assert ratio[-1] <= 1 + 1e-9
-
-
-@pytest.mark.parametrize("scene", [*SCENES.values(), *map(read_scene, scene_names()[-9:-4])])
-def test_the_junction_and_the_clamped_edges_are_kept(scene: Any) -> None:
-    model = JointModel.of(scene)
-    coarse = model.graded()
-    assert coarse.junction.shape == model.junction.shape
-    for part, made in zip(model.parts, coarse.parts, strict=True):
-        np.testing.assert_array_equal(part.plate.y[list(part.junction)], made.plate.y[list(made.junction)])
-        assert set(made.plate.y) <= set(part.plate.y)
-        assert {made.plate.y[line] for line in made.clamped} == {part.plate.y[line] for line in part.clamped}
-        assert (made.plate.y[[0, -1]] == part.plate.y[[0, -1]]).all()
 
 
 # --- K⁻¹ by a factor, refined where the residual asks for it --------------------------------------------

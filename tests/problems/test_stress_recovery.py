@@ -16,8 +16,6 @@ from harness.scene.stress import refuse_unusable, stresses, stresses_of
 from harness.shimming.study import ShimStudy
 from harness.verification.reference import proof_of
 from problems.build import model_of
-from problems.formats.matrix_text import write_matrix_market
-from problems.formats.nastran import pyyeti
 from problems.load_cases import Listed
 from problems.model.condensed_plate import CondensedPlate
 from problems.model.joint import Joint
@@ -70,7 +68,7 @@ def condensed(folder: Path, joint: Joint, recovered: str = "ab") -> list[Tables]
 
 def test_a_condensed_plate_has_the_plates_stresses(tmp_path: Path) -> None:
     joint = two_plates()
-    scene = scene_of({"joint": joint.model_dump(exclude_unset=True), "effect": EFFECTS})
+    scene = scene_of({"joint": joint, "effect": EFFECTS})
     plates = stresses(solve(scene, form="sparse"))
     largest = max(part.von_mises.max() for part in plates.parts)
     assert largest > 0.1
@@ -204,20 +202,6 @@ def test_it_is_in_no_key(tmp_path: Path) -> None:
     assert scene_from(parts).key == scene_from(bare).key
 
 
-@pytest.mark.parametrize("format", ["mtx", "op4"])
-def test_other_formats_are_read(format: str, tmp_path: Path) -> None:
-    S = np.arange(36.0).reshape(6, 6)
-    path = tmp_path / "s" / "A.mtx"
-    if format == "op4":
-        path = tmp_path / "s.op4"
-        pyyeti(path).op4.OP4().write(str(path), {"otm": S}, binary=True)
-    else:
-        data = {"K": np.eye(6), "A": S, "f": np.ones(6), "g": np.ones(6)}
-        write_matrix_market(tmp_path / "s", data)
-    scene = scene_from(point_matrix(tmp_path, GOOD, TWO, stress=str(path)))
-    np.testing.assert_array_equal(scene.joint.parts[0].recovery.S.toarray(), S)
-
-
 TOML = """\
 [output]
 stress = true
@@ -242,14 +226,12 @@ points = [[10.0, 5.0]]
 
 
 @pytest.mark.usefixtures("without_pictures")
-@pytest.mark.parametrize(("allowed", "code", "word"), [(1e4, 0, "PASS"), (1e-4, 4, "FAIL")])
-def test_an_allowed_stress(tmp_path: Path, allowed: float, code: int, word: str) -> None:
+def test_an_allowed_stress(tmp_path: Path) -> None:
     S = np.vstack([GOOD[:3] * [[1], [0], [0]], GOOD[:3] * [[3], [0], [0]]])
     point_matrix(tmp_path, S, TWO)
     (tmp_path / "j.toml").write_text(TOML, "utf-8")
-    done = harness("solve", tmp_path / "j.toml", "--allow-stress", allowed, "--out", tmp_path / "out")
-    assert done.exit_code == code, done.output
-    assert word in done.output
+    done = harness("solve", tmp_path / "j.toml", "--allow-stress", 1e-4, "--out", tmp_path / "out")
+    assert (done.exit_code, "FAIL" in done.output) == (4, True), done.output
     answer = (tmp_path / "out/answer.md").read_text("utf-8")
     assert "a, on the bottom, x = 1 mm, y = 2 mm" in answer
     assert "none known of b" in answer

@@ -24,12 +24,6 @@ def test_a_grid_is_found_in_any_order_of_its_nodes_and_apart_from_rounding() -> 
     ):
         assert isinstance(surface_of(given_nodes), Grid)
     assert isinstance(surface_of(nodes[:-1]), Triangles)
-    shuffled, plain = surface_of(nodes[order]), surface_of(nodes)
-    np.testing.assert_array_equal(shuffled.areas, plain.areas[order])
-    points = np.random.default_rng(3).uniform([0, 2], [8.5, 6], (30, 2))
-    np.testing.assert_array_equal(
-        shuffled.weights(points).toarray(), plain.weights(points).toarray()[:, order]
-    )
 
 
 @given(st.integers(0, 10_000), st.booleans())
@@ -71,12 +65,12 @@ def test_a_mesh_that_grows_coarser_keeps_its_triangles() -> None:
     assert surface.areas.sum() == pytest.approx((x[-1] - x[0]) * 30 - (x[-1] - x[-2]) * 5 / 2)
 
 
-@pytest.mark.parametrize("moved", [0.0, 0.3])
-def test_the_order_of_the_nodes_changes_no_bit(moved: float) -> None:
-    """In a grid without a node, whose diagonals are free, and in scattered nodes."""
+@pytest.mark.parametrize(("moved", "missing"), [(0.0, []), (0.0, [40]), (0.3, [40])])
+def test_the_order_of_the_nodes_changes_no_bit(moved: float, missing: list[int]) -> None:
+    """In a grid, in one without a node, whose diagonals are free, and in scattered nodes."""
     random = np.random.default_rng(7)
     nodes = crossings(np.arange(12.0), np.arange(9.0)) + moved * random.uniform(-1, 1, (108, 2))
-    nodes = np.delete(nodes, 40, axis=0)
+    nodes = np.delete(nodes, missing, axis=0)
     points, order = random.uniform(-0.5, 12, (400, 2)), random.permutation(len(nodes))
     plain, shuffled = surface_of(nodes), surface_of(nodes[order])
     np.testing.assert_array_equal(
