@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import coordinate, counted, no_less, out_of, significant, whole
+from report.document.numbers import beside, coordinate, counted, out_of, raised, significant, whole
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.results.series_results import read as read_series
@@ -99,7 +99,7 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
             line = (kept if len(kept) else most).iloc[0]
             lines.append({"family": text, **line[["fasteners", "gap_mm"]], "kept": line["gap_mm"] <= limit})
     columns = [word("plan", "family"), number("fasteners", "fasteners", whole)]
-    columns.append(number("gap, mm", "gap_mm", no_less(limit)))
+    columns.append(number("gap, mm", "gap_mm", beside(limit, raised)))
     if record["limit_mm"] is not None:
         columns.append(Column("within the limit", lambda line: "yes" if line["kept"] else "no", "left"))
     caption = (
@@ -180,7 +180,7 @@ def _order(record: dict[str, Any]) -> list[Block]:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     columns = [number("set", "set", whole), *([word("hole", "name")] if labels else [])]
     columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
-    columns.append(number("gap after it, mm", "gap_mm", no_less(record["limit_mm"] or 0.0)))
+    columns.append(number("gap after it, mm", "gap_mm", beside(record["limit_mm"] or 0.0, raised)))
     caption = "*The order that keeps the gap small*: the reverse of removing what is needed least."
     return [
         Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),

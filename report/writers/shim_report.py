@@ -16,7 +16,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import coordinate, counted, no_less, significant, whole
+from report.document.numbers import beside, coordinate, counted, raised, significant, whole
 from report.figures import style
 from report.page.page_file import Data, banner, table_data
 from report.page.page_file import write as write_page
@@ -114,7 +114,9 @@ def _largest(record: dict[str, Any], key: str, shims: int) -> str:
     unit, name = LIMITS[key]
     if record[name] is None:
         return ""
-    before, after = (f"{no_less(record[name])(record[when][key])} {unit}" for when in ("before", "after"))
+    before, after = (
+        f"{beside(record[name], raised)(record[when][key])} {unit}" for when in ("before", "after")
+    )
     chose, fresh = (" in the cases that chose", " in the fresh cases") if record["samples"] else ("", "")
     at = f", at {record['worst_at']}" if key == "gap" else ""
     if shims:

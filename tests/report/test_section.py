@@ -18,7 +18,6 @@ from report.document.numbers import (
     digits_beside,
     error_beside,
     extent,
-    no_less,
     position,
     proven_to,
     raised,
@@ -250,7 +249,9 @@ def test_a_value_is_shown_on_its_side_of_a_limit() -> None:
     said = [beside(0.05)(value) for value in (0.0512, 0.05004, 0.05, 0.04999)]
     assert said == ["0.0512", "0.05004", "0.0500", "0.0500"]
     assert [beside(0.05)(value) for value in (np.inf, None, np.nan)] == ["inf", "–", "–"]
-    said = [no_less(0.05)(value) for value in (0.05121, 0.04991, 0.04999, 0.05, 0.050001, np.inf, None)]
+    said = [
+        beside(0.05, raised)(value) for value in (0.05121, 0.04991, 0.04999, 0.05, 0.050001, np.inf, None)
+    ]
     assert said == ["0.0513", "0.0500", "0.0500", "0.0500", "0.0501", "inf", "–"]
     errors = [error_beside(1e-7, value) for value in (2e-7, 1.000004e-7, 1e-7, 3.21e-12)]
     assert errors == ["2.000e-07", "1.000004e-07", "1.000e-07", "3.210e-12"]
