@@ -110,8 +110,7 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
 
 
 def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
-    drawing = style.figure(3.4)
-    axes = drawing.subplots()
+    drawing, axes = style.single(3.4)
     for name, (text, colour, marker, line) in FAMILIES.items():
         plans = steps[steps["moved"] == name].sort_values("fasteners")
         if len(plans):
@@ -173,8 +172,7 @@ def _order(record: dict[str, Any]) -> list[Block]:
         at |= {"name": labels.get((x, y), "")} if labels else {}
         lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]} | at)
     table = pd.DataFrame(lines)
-    drawing = style.figure(3.0)
-    axes = drawing.subplots()
+    drawing, axes = style.single(3.0)
     axes.plot(table["set"], table["gap_mm"], color=style.BLUE, marker="o", ms=4)
     axes.set(xlabel="fasteners set", ylabel="largest gap, mm", ylim=(0, None))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -4,8 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Drawing
 
 from report.analysis.checks import code_warnings
 from report.document.blocks import Figure, Section, Table, Text, facts_table, number, word
@@ -152,7 +150,7 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
 
 
 def _exceedance(curve: pd.DataFrame, cases: int) -> Figure:
-    drawing, axes = _axes()
+    drawing, axes = style.single(3.2)
     for (name, label), (colour, line) in zip(CURVES.items(), LOOKS, strict=False):
         shown = curve[curve[name] > 0]
         axes.plot(shown["gap_mm"], 100 * shown[name], line, color=colour, label=label)
@@ -165,7 +163,7 @@ def _exceedance(curve: pd.DataFrame, cases: int) -> Figure:
 
 def _convergence(series: Series) -> Figure:
     table = convergence(series)
-    drawing, axes = _axes()
+    drawing, axes = style.single(3.2)
     for q, (colour, line) in zip(QUANTILES[1:], LOOKS, strict=True):
         lines = table[table["quantile"] == q]
         axes.plot(lines["cases"], lines["gap_mm"], line, marker=".", color=colour, label=PERCENT[q])
@@ -183,7 +181,7 @@ def _convergence(series: Series) -> Figure:
 def _swept(series: Series, key: str) -> Figure:
     ranges = series.cases.groupby(key)[list(GAPS)].agg(["min", "median", "max"])
     ranges.columns = ["_".join(pair) for pair in ranges.columns.to_flat_index()]
-    drawing, axes = _axes()
+    drawing, axes = style.single(3.2)
     for (name, label), (colour, line) in zip(GAPS.items(), LOOKS, strict=False):
         middle, low, high = (ranges[f"{name}_{end}"] for end in ("median", "min", "max"))
         axes.plot(ranges.index, middle, line, color=colour, marker="o", markersize=3, label=label)
@@ -198,11 +196,6 @@ def _swept(series: Series, key: str) -> Figure:
             "acts where no gap is left."
         )
     return Figure(f"sweep-{file_name(key)}", caption, drawing, ranges.reset_index())
-
-
-def _axes() -> tuple[Drawing, Axes]:
-    drawing = style.figure(3.2)
-    return drawing, drawing.subplots()
 
 
 def series_data(series: Series, quantiles: Array, curve: pd.DataFrame) -> Data:

@@ -134,8 +134,7 @@ def _stock(pieces: pd.DataFrame, sizes: list[str]) -> list[Block]:
     of = {"pieces": ("joint", "size"), "joints": ("joint", "nunique"), "area_mm2": ("area_mm2", "sum")}
     table = pieces.groupby(sizes).agg(**of).reset_index()
     names = [" to ".join(f"{t:g}" for t in row) for row in table[sizes].to_numpy()]
-    drawing = style.figure(2.6)
-    axes = drawing.subplots()
+    drawing, axes = style.single(2.6)
     axes.bar(names, table["pieces"], color=style.BLUE)
     axes.set(xlabel="thickness, mm", ylabel="pieces")
     heads = "thickness, mm", "at its other end, mm"
@@ -157,8 +156,7 @@ def _range(axis: str, line: Mapping[str, Any]) -> str:
 def _drawing(record: dict[str, Any], shims: pd.DataFrame, label: str) -> Drawing:
     """The junction with each shim, its name and what `label` has of it; the ticks are borders of shims."""
     (west, south), (east, north) = record["bounds"]
-    drawing = style.figure(min(max(style.WIDTH * (north - south) / (east - west), 2.2), style.WIDTH))
-    axes = drawing.subplots()
+    drawing, axes = style.single(min(max(style.WIDTH * (north - south) / (east - west), 2.2), style.WIDTH))
     axes.add_patch(Rectangle((west, south), east - west, north - south, fill=False))
     corners = [np.array(outline) for outline in shims["outline"]]
     for outline, (_, line) in zip(corners, shims.iterrows(), strict=True):
