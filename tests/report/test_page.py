@@ -58,10 +58,6 @@ class Page(HTMLParser):
         return json.loads(self.texts[0])
 
 
-def page_of(directory: Path, target: Path) -> Page:
-    return Page(write(target, "Made up", run_data(read(directory)), directory).read_text("utf-8"))
-
-
 def column(data: Any, name: str) -> list[Any]:
     found = data["cells"][name]
     return found if isinstance(found, list) else [found["distinct"][place] for place in found["places"]]
@@ -73,7 +69,7 @@ def unpacked(text: str) -> np.ndarray:
 
 def test_every_cell_is_in_the_page_with_all_its_digits(tmp_path: Path) -> None:
     directory = everything(tmp_path / "made", SIZES)
-    data = page_of(directory, tmp_path / "index.html").data
+    data = Page(write(tmp_path / "index.html", "", run_data(read(directory))).read_text("utf-8")).data
     cells = read(directory).cells
     cells = cells[cells["status"] != "unsupported"]
     assert len(cells) == 48

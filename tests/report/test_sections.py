@@ -11,7 +11,7 @@ from urllib.parse import parse_qs
 import pandas as pd
 import pytest
 from matplotlib.image import imread
-from synthetic_results import everything, no_answer, results, row, sweep, table, write_rows
+from synthetic_results import HIGH, LOW, everything, no_answer, results, row, sweep, table, write_rows
 
 from harness.results.schema import OWNERS
 from report.document.blocks import WIDEST, Figure, Section, Table, number, word
@@ -30,7 +30,6 @@ from report.sections import (
 from report.writers.sections_writer import written
 from report.writers.suite_report import contents, write
 
-LOW, HIGH = "4386/0100", "4386/1000"
 SWEEP = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
 FORMS = {form: row(LOW, "newton", form) for form in ("dual", "primal", "sparse")}
 COUNTED = row(LOW, "newton", details={"products": 15})
