@@ -59,6 +59,11 @@ def no_answer(status: str) -> dict[str, Any]:
     return dict.fromkeys((*names, *more, "duality_gap"), None) | {"status": status, "verdict": "no_answer"}
 
 
+def times(**seconds: float) -> dict[str, float]:
+    """A row's times: nothing but these."""
+    return dict.fromkeys(("convert_s", "prepare_s", "setup_s", "solve_s", "form_s"), 0.0) | seconds
+
+
 def write_rows(directory: Path, rows: list[dict[str, Any]]) -> Path:
     directory.mkdir(parents=True, exist_ok=True)
     text = "".join(json.dumps(r) + "\n" for r in rows)
@@ -169,10 +174,9 @@ LOW, HIGH = "4386/0100", "4386/1000"
 
 def answer(scene: str, solver: str, digits: int, seconds: float, error: float, **more: Any) -> dict[str, Any]:
     """A row asked for 10^-digits that took `seconds` of solve and nothing else."""
-    steps = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "form_s"), 0.0)
     verdict = "within" if error <= 1e-7 else "outside"
-    figures = {"solve_s": seconds, "displacement_error_mm": error, "verdict": verdict}
-    return row(scene, solver, tolerance=float(f"1e-{digits}"), **(steps | figures | more))
+    figures = times(solve_s=seconds) | {"displacement_error_mm": error, "verdict": verdict}
+    return row(scene, solver, tolerance=float(f"1e-{digits}"), **(figures | more))
 
 
 def sweep() -> list[dict[str, Any]]:

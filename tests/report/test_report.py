@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import pytest
 from commands import harness
-from synthetic_results import HIGH, LOW, no_answer, results, row, table, write_rows
+from synthetic_results import HIGH, LOW, no_answer, results, row, table, times, write_rows
 
 from report.analysis.standings import shown, standings
 from report.document.blocks import Figure
@@ -21,11 +21,6 @@ from report.sections.summary import EACH, PREPARED, advice, explained, scoreboar
 from report.writers.suite_report import write
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
-
-
-def times(**seconds: float) -> dict[str, float]:
-    """A row's times: nothing but these."""
-    return dict.fromkeys(("convert_s", "prepare_s", "setup_s", "solve_s", "form_s"), 0.0) | seconds
 
 
 def outside(error: float) -> dict[str, Any]:
