@@ -31,20 +31,19 @@ STRESS = "von Mises stress"
 
 
 def scene_maps(results: Results) -> Data:
-    """The maps of a run's scenes as far as they fit, and the names of those left out."""
-    page = _empty()
+    """The maps of a run's scenes as far as they fit; what they tell names those left out."""
+    page, left_out = _empty(), []
     for scene in results.cells.sort_values(["n", "active", "scene"])["scene"].unique():
-        arrays = results.scene_arrays(scene)
-        if arrays == {}:  # damaged
-            page["left_out"].append(scene)
-        elif arrays:
-            fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
-            marks = arrays.get("fasteners", NO_MARKS)
-            if not _add_map(page, scene, arrays["contact_nodes"], fields, marks, budget=BUDGET):
-                page["left_out"].append(scene)
-    if page["left_out"]:
+        if (arrays := results.scene_arrays(scene)) is None:
+            continue
+        fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
+        marks = arrays.get("fasteners", NO_MARKS)
+        damaged = not arrays
+        if damaged or not _add_map(page, scene, arrays["contact_nodes"], fields, marks, budget=BUDGET):
+            left_out.append(scene)
+    if left_out:
         for made in page["maps"]:
-            made["about"] += f" Left out, too large or damaged: {', '.join(page['left_out'])}."
+            made["about"] += f" Left out, too large or damaged: {', '.join(left_out)}."
     return page
 
 
@@ -56,14 +55,13 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
     check, stress = record.get("allowed_gap") or {}, record.get("stress") or {}
     fields |= {f"gap of {stage['name']}": gap for stage, gap in gaps}
-    page = _pairs(record, fields, arrays, check.get("allowed_mm"))
+    page = _pairs(record, fields, arrays, check.get("allowed_mm", np.inf))
     for k, part in enumerate(record["parts"] if "stress" in arrays else ()):
         places, highest, unread = stress_map(arrays, k)
         values, name = np.where(unread, np.nan, highest), f"stress of {part['name']}"
         if len(places):
-            _add_map(
-                page, name, places, {STRESS: values}, _marked(record), stress.get("allowed"), noun="place"
-            )
+            limit = stress.get("allowed", np.inf)
+            _add_map(page, name, places, {STRESS: values}, _marked(record), limit, noun="place")
     return page
 
 
@@ -79,7 +77,7 @@ def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
 
 
 def _pairs(
-    record: Data, fields: dict[str, Array], arrays: dict[str, Array], limit: float | None = None
+    record: Data, fields: dict[str, Array], arrays: dict[str, Array], limit: float = np.inf
 ) -> Data:
     page = _empty()
     marks = _marked(record)
@@ -106,7 +104,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     step = _step(len(series.nodes))
     curves = _exceeded(series, step)
     maps = dict(zip(names, quantiles, strict=True))
-    limit = (series.facts.get("allowed_gap") or {}).get("allowed_mm")
+    limit = (series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf)
     _add_map(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners, limit)
     (made,) = page["maps"]
     worst, *others = _chosen(series)
@@ -170,7 +168,7 @@ def hover_names(page: Data) -> list[str]:
 
 
 def _empty() -> Data:
-    return {"groups": [], "maps": [], "left_out": []}
+    return {"groups": [], "maps": []}
 
 
 def _add_map(
@@ -179,7 +177,7 @@ def _add_map(
     nodes: Array,
     fields: dict[str, Array],
     marks: Array,
-    limit: float | None = None,
+    limit: float = np.inf,
     budget: float = np.inf,
     noun: str = "contact",
 ) -> bool:
@@ -224,14 +222,14 @@ def _frame(nodes: Array) -> Data:
     }
 
 
-def _field(name: str, values: Array, limit: float | None) -> Data:
+def _field(name: str, values: Array, limit: float) -> Data:
     """A field with the range of its colours: gaps from the least, at most 0, forces from 1/10 000 of the
     most. limit : of a gap or a stress, above which contacts are outlined.
     """
     high = float(np.nanmax(values, initial=0.0)) or 1.0
     values = np.where(abs(values) <= ROUNDING * high, 0.0, values)
     force = name == FIELDS["lam"]
-    limit = None if force else limit
+    limit = np.inf if force else limit
     return {
         "kind": "force" if force else "gap",
         "unit": "N" if force else "N/mm²" if name == STRESS else "mm",
@@ -239,7 +237,7 @@ def _field(name: str, values: Array, limit: float | None) -> Data:
         "high": high,
         "hover": True,
         "limit": limit,
-        "values": packed(values, np.inf if limit is None else limit),
+        "values": packed(values, limit),
     }
 
 
