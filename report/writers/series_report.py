@@ -38,10 +38,7 @@ CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": 
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md from the series in DIRECTORY, with index.html and sheet.pdf beside it.
-
-    Returns the path of report.md.
-    """
+    """Write report/report.md of the series in DIRECTORY, with a page and a sheet; returns its path."""
     series = read(directory)
     check = series.facts.get("allowed_gap")
     verdict = [Text(f"**{check['said'][-1]}** {' '.join(check['said'][:-1])} {WHERE}")] if check else []
@@ -57,10 +54,9 @@ def write(directory: Path) -> Path:
         sections.append(Section("The remaining gap", blocks))
         data = series_data(series, maps, curve)
     target = emptied(directory / "report")
+    page = written(target / "report.md", title, sections)
     if data:
         write_page(target / "index.html", title, data)
-    page = written(target / "report.md", title, sections)
-    if len(series.cases):
         write_sheet(target / "sheet.pdf", _sheet(series, directory, target))
     return page
 

@@ -31,10 +31,7 @@ NEAR = 0.9  # of the limit: a gap is at it
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report.md from the record in DIRECTORY, with index.html and sheet.pdf beside it.
-
-    Returns the path of report.md.
-    """
+    """Write DIRECTORY/report.md from the record in DIRECTORY, with a page and a sheet; returns its path."""
     record = quoted(json.loads((directory / "shim.json").read_text("utf-8")))
     patches = pd.DataFrame(record["patches"]).astype(dict.fromkeys(COLUMNS.values(), float))  # NaN: not known
     title = f"Shims: {record['title']}"
