@@ -104,8 +104,8 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     step = _step(len(series.nodes))
     curves = _exceeded(series, step)
     maps = dict(zip(names, quantiles, strict=True))
-    limit = (series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf)
-    _add_map(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners, limit)
+    name, limit = counted(len(series.cases), "case"), series.limit_mm
+    _add_map(page, name, series.nodes, maps, series.fasteners, limit)
     (made,) = page["maps"]
     worst, *others = _chosen(series)
     spent, cases = _size(made["fields"]) + len(curves), {}

@@ -47,6 +47,11 @@ class Series:
     forces: Array
 
     @property
+    def limit_mm(self) -> float:
+        """The allowed gap, mm; infinite without one."""
+        return float((self.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf))
+
+    @property
     def marks(self) -> dict[str, list[list[float]]]:
         """The fasteners for a map of the junction."""
         return {"fasteners": self.fasteners.tolist()} if len(self.fasteners) else {}

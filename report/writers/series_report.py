@@ -70,8 +70,8 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
     record = facts | {
         "commit": series.code["commit"].iloc[-1],
         "scene_key": facts["identity"].get("scene_key"),
+        "version": (facts.get("versions") or {}).get("rivetbench", ""),
     }
-    record["version"] = (facts.get("versions") or {}).get("rivetbench", "")
     about = origin(record), facts.get("inputs", {}), [file for file in pictures if file.exists()][:2]
     return Sheet(str(facts["title"]), check["kind"], verdict, sure, *about, [_statistics(series)])
 
@@ -79,12 +79,7 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
 def _largest(series: Series) -> str:
     largest = series.cases["max_gap_mm"]
     worst = int(series.cases["case"].to_numpy()[largest.to_numpy().argmax()])
-    return f"{beside(_limit(series))(largest.max())} mm, in case {worst}"
-
-
-def _limit(series: Series) -> float:
-    """The allowed gap, mm; infinite without one."""
-    return float((series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf))
+    return f"{beside(series.limit_mm)(largest.max())} mm, in case {worst}"
 
 
 def _summary(series: Series) -> Table:
@@ -120,7 +115,7 @@ def _statistics(series: Series) -> Table:
     table = table.assign(figure=list(GAPS.values()), mean=figures.mean(), largest=figures.max())
     columns = [word("mm", "figure"), number("mean", "mean")]
     columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES]
-    columns.append(number("largest", "largest", beside(_limit(series))))
+    columns.append(number("largest", "largest", beside(series.limit_mm)))
     return Table("statistics", "*Quantiles over the cases.*", table, columns)
 
 
@@ -135,7 +130,7 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
     values = dict(zip([*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"], maps, strict=True))
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
     quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
-    larger = larger_than(_limit(series), gap)
+    larger = larger_than(series.limit_mm, gap)
     worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), [larger], series.marks)
     caption = "*The remaining gap at each contact: quantiles over the cases.*"
     of_worst = f"*The worst case: a largest gap of {_largest(series)}.*"
