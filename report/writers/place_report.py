@@ -1,6 +1,5 @@
 """Writes the report of a search for a plan of fasteners: report.md with pictures, and plan.csv, order.csv."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.ticker import MaxNLocator
 
+from harness.results import records
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
 from report.document.numbers import beside, coordinate, counted, out_of, raised, significant, whole
@@ -31,7 +31,7 @@ FAMILIES = {
 
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report/report.md from the record and the series in DIRECTORY. Returns its path."""
-    record = quoted(json.loads((directory / "place.json").read_text("utf-8")))
+    record = quoted(records.read_object(directory / "place.json"))
     steps = pd.DataFrame(record["steps"]).astype({"gap_mm": float})  # NaN where nothing is proven
     title = f"Where fasteners go: {record['title']}"
     with style.applied():

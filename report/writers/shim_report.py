@@ -1,6 +1,5 @@
 """Writes the report of a search for shims: report.md with a drawing and tables, index.html, and sheet.pdf."""
 
-import json
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Mapping
@@ -14,6 +13,7 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Polygon, Rectangle
 
+from harness.results import records
 from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, word
 from report.document.escape import quoted
 from report.document.numbers import beside, coordinate, counted, raised, significant, whole
@@ -32,7 +32,7 @@ NEAR = 0.9  # of the limit: a gap is at it
 
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report.md from the record in DIRECTORY, with a page and a sheet; returns its path."""
-    record = quoted(json.loads((directory / "shim.json").read_text("utf-8")))
+    record = quoted(records.read_object(directory / "shim.json"))
     patches = pd.DataFrame(record["patches"]).astype(dict.fromkeys(COLUMNS.values(), float))  # NaN: not known
     title = f"Shims: {record['title']}"
     label, what, heads = "thickness_mm", "thickness in mm", [number("thickness, mm", "thickness_mm")]
