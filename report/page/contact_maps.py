@@ -76,9 +76,7 @@ def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
     return page
 
 
-def _pairs(
-    record: Data, fields: dict[str, Array], arrays: dict[str, Array], limit: float = np.inf
-) -> Data:
+def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array], limit: float = np.inf) -> Data:
     page = _empty()
     marks = _marked(record)
     for pair in record["pairs"] if "contact_nodes" in arrays else ():

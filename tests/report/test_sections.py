@@ -20,7 +20,6 @@ from report.results.reader import read
 from report.sections import (
     SECTIONS,
     accuracy,
-    all_measurements,
     random_scenes,
     series_throughput,
     speed,
@@ -154,11 +153,6 @@ def test_a_whole_report_has_every_section_its_pictures_and_links_that_lead_somew
     rules = re.findall(r"^\|[:|-]+\|$", page, re.MULTILINE)
     assert len(rules) > 5
     assert max(rule.count("|") - 1 for rule in rules) <= WIDEST
-
-
-def test_one_active_contact_is_no_plural(tmp_path: Path) -> None:
-    shown = table(all_measurements.section(results(tmp_path, [row("4386/0001")])))
-    assert "1 active contact (" in shown.caption
 
 
 def test_equal_titles_lead_to_a_heading_each() -> None:
