@@ -86,8 +86,10 @@ def write(directory: Path) -> Path:
     title = str(record["title"])
     write_page(directory / "index.html", title, answer_data(record, arrays))
     sections = [Section("The answer", blocks), Section("How sure it is", sure)]
-    if skipped := _skipped(record):
-        sections.append(Section("What was skipped", skipped))
+    digits = f"The matrices were given. {record['digits']}." if record["digits"] else ""
+    skipped = "\n".join(f"- {line}" for line in record["skipped"])
+    if told := [Text(text) for text in (digits, skipped) if text]:
+        sections.append(Section("What was skipped", told))
     verdict = [f"**{headline(record, arrays)['text']}**"]
     verdict += [f"> **Warning.** {sentence}." for sentence in record.get("unusual", ())]
     page = written(directory / "answer.md", title, sections, verdict, files)
@@ -150,12 +152,6 @@ def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
 
 def _range(heading: str, name: str) -> Column:
     return Column(heading, lambda row: extent(row[name]))
-
-
-def _skipped(record: dict[str, Any]) -> list[Block]:
-    lines = [f"- {line}" for line in record["skipped"]]
-    digits = [f"The matrices were given. {record['digits']}."] if record["digits"] else []
-    return [Text(text) for text in (*digits, "\n".join(lines)) if text]
 
 
 def write_vtu(
