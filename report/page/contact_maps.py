@@ -105,9 +105,8 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     name, limit = counted(len(series.cases), "case"), series.limit_mm
     _add_map(page, name, series.nodes, maps, series.fasteners, limit)
     (made,) = page["maps"]
-    worst, *others = _chosen(series)
-    spent, cases = _size(made["fields"]) + len(curves), {}
-    for case in (worst, *others):
+    worst, spent, cases = series.worst_case, _size(made["fields"]) + len(curves), {}
+    for case in _chosen(series):
         gaps = np.asarray(series.gaps[case, ::step], dtype=float)
         field = _field("gap", gaps, limit) | {"hover": False}
         spent += len(field["values"])
@@ -124,7 +123,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
 def _chosen(series: Series) -> Iterator[int]:
     """The worst case, then others at equal distances."""
     numbers = series.cases["case"].to_numpy()
-    worst = int(numbers[series.cases["max_gap_mm"].to_numpy().argmax()])
+    worst = series.worst_case
     yield worst
     for place in np.unique(np.linspace(0, len(numbers) - 1, CASES - 1).astype(int)):
         if numbers[place] != worst:

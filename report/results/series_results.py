@@ -57,6 +57,11 @@ class Series:
         return {"fasteners": self.fasteners.tolist()} if len(self.fasteners) else {}
 
     @property
+    def worst_case(self) -> int:
+        """The number of the case with the largest gap."""
+        return int(self.cases["case"].iloc[self.cases["max_gap_mm"].to_numpy().argmax()])
+
+    @property
     def independent(self) -> "Series":
         """The independent cases alone: of those for contributors, two of each base point."""
         per_point = self.facts.get("cases_per_point", 1)

@@ -77,9 +77,8 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
 
 
 def _largest(series: Series) -> str:
-    largest = series.cases["max_gap_mm"]
-    worst = int(series.cases["case"].to_numpy()[largest.to_numpy().argmax()])
-    return f"{beside(series.limit_mm)(largest.max())} mm, in case {worst}"
+    largest = beside(series.limit_mm)(series.cases["max_gap_mm"].max())
+    return f"{largest} mm, in case {series.worst_case}"
 
 
 def _summary(series: Series) -> Table:
@@ -124,7 +123,7 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
     nodes = series.nodes
     if nodes is None:
         return []
-    case = int(series.cases["case"].iloc[series.cases["max_gap_mm"].to_numpy().argmax()])
+    case = series.worst_case
     gap = np.asarray(series.gaps[case], dtype=float)
     places = pd.DataFrame(nodes[:, :2], columns=["x_mm", "y_mm"])
     values = dict(zip([*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"], maps, strict=True))
