@@ -136,7 +136,7 @@ def _exceeded(series: Series, step: int) -> str:
     return packed(np.concatenate([np.quantile(gaps, shares, axis=0).T for gaps in series.of_contacts(step)]))
 
 
-def map_controls(page: Data) -> list[Data]:
+def _controls(page: Data) -> list[Data]:
     """The lists and numbers above the maps of a page, if it has any."""
     if not page["maps"]:
         return []
@@ -152,16 +152,12 @@ def map_controls(page: Data) -> list[Data]:
 
 
 def map_view(page: Data) -> Data:
-    """The view, the controls and the figure of a page that has maps alone."""
-    views = [("maps", "Gap maps")] if page["maps"] else []
-    figures = {"map": map_item(hover_names(page))}
-    return {"views": views, "controls": map_controls(page), "maps": page, "figures": figures}
-
-
-def hover_names(page: Data) -> list[str]:
-    """The fields told where the pointer is on a map of the page."""
+    """The view, the controls and the figure of a page's maps, which tells values where the pointer is."""
     fields = (item for made in page["maps"] for item in made["fields"].items())
-    return list(dict.fromkeys(name for name, field in fields if field["hover"]))
+    told = dict.fromkeys(name for name, field in fields if field["hover"])
+    views = [("maps", "Gap maps")] if page["maps"] else []
+    figures = {"map": map_item([*told])}
+    return {"views": views, "controls": _controls(page), "maps": page, "figures": figures}
 
 
 def _empty() -> Data:
