@@ -186,17 +186,6 @@ def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
     assert re.search(r"\| c \(dual\) .* time limit .* > 60 s \(time limit\) \|", text)
 
 
-def test_what_is_mixed_or_missing_is_said(tmp_path: Path) -> None:
-    rows = [row(LOW, "a", solver_version="1.0"), row(HIGH, "a", solver_version="1.1", threads=1)]
-    write_rows(tmp_path, rows)
-    plan = f'scenes = ["{LOW}", "{HIGH}"]\n[[solver]]\nname = "a"\nforms = ["dual", "primal"]\n'
-    (tmp_path / "suite.toml").write_text(plan, "utf-8")
-    text = write(tmp_path).read_text("utf-8")
-    assert "2 of 4 combinations of scene, solver and form" in text
-    assert "a was run in several versions: 1.0 and 1.1." in text
-    assert "In 1 row (a) the number of threads in effect was not the requested one" in text
-
-
 def test_a_run_without_an_answer_stands_with_the_others_of_its_method(tmp_path: Path) -> None:
     """A killed run does not say how many threads were in effect, which is not what was asked for."""
     scenes = [f"4386/{k:04d}" for k in range(5)]

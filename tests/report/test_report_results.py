@@ -92,6 +92,13 @@ def test_a_report_of_the_same_code_is_the_same_bytes(tmp_path: Path) -> None:
     assert write(directory).read_bytes() == first
 
 
+def test_several_versions_and_other_threads_than_those_asked_for_are_said(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", solver_version="1.0"), row(HIGH, "a", solver_version="1.1", threads=1)]
+    _, versions, threads = said(tmp_path, *rows)
+    assert versions == "a was run in several versions: 1.0 and 1.1."
+    assert threads.startswith("In 1 row (a) the number of threads in effect was not the requested one")
+
+
 # What is missing.
 
 
