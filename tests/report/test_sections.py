@@ -30,7 +30,10 @@ from report.writers.sections_writer import written
 from report.writers.suite_report import contents, write
 
 SWEEP = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
-FORMS = {form: row(LOW, "newton", form) for form in ("dual", "primal", "sparse")}
+DUAL, PRIMAL, SPARSE = (row(LOW, "newton", form) for form in ("dual", "primal", "sparse"))
+#: Rows without both dense and sparse forms; a case of a series does not count, nor a form that is not taken.
+WITHOUT_BOTH = [[DUAL, PRIMAL], [SPARSE], [DUAL, SPARSE | {"case": 3}]]
+WITHOUT_BOTH += [[DUAL, SPARSE | {"status": "unsupported"}]]
 COUNTED = row(LOW, "newton", details={"products": 15})
 
 
@@ -53,16 +56,7 @@ def resolved(page: str) -> set[str]:
         (speed.machine, [row(LOW, "newton")]),  # without benchmarks
         (summary.advice, [row(LOW, "a"), row(HIGH, "a")]),  # one method alone
         (speed.methods, [COUNTED, row(LOW, "piqp")]),  # one that counts is no comparison
-        (time_to_solution.section, [FORMS["dual"], FORMS["primal"]]),  # it takes dense and sparse forms,
-        (time_to_solution.section, [FORMS["sparse"]]),
-        (
-            time_to_solution.section,
-            [FORMS["dual"], FORMS["sparse"] | {"case": 3}],
-        ),  # no case of a series, which has
-        (
-            time_to_solution.section,
-            [FORMS["dual"], FORMS["sparse"] | {"status": "unsupported"}],
-        ),  # paid nothing
+        *((time_to_solution.section, rows) for rows in WITHOUT_BOTH),
     ],
 )
 def test_without_its_rows_there_is_no_section(tmp_path: Path, section: Any, rows: list[Any]) -> None:
