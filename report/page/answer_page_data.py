@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from report.document.blocks import Table, number, word
+from report.document.blocks import Column, Table, number, word
 from report.document.numbers import (
     beside,
     coordinate,
@@ -41,7 +41,8 @@ def stage_table(record: Data, arrays: dict[str, Array]) -> Table:
     """The history of a scene with stages: a line per stage; without stages, no line."""
     table = stages(record, arrays)
     shown = beside((record.get("allowed_gap") or {}).get("allowed_mm", 0.0))
-    columns = [word("stage", "stage"), number("largest gap, mm", "largest_mm", shown), word("at", "at")]
+    columns = [Column("stage", lambda line: str(line["stage"]), "left")]
+    columns += [number("largest gap, mm", "largest_mm", shown), word("at", "at")]
     columns += [number(name, name) for name in table.columns if name == STRESS]
     columns += [number("closed", "closed", whole)]
     columns += [number(name, name) for name in table.columns if name.endswith(", N")]
