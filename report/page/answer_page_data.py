@@ -18,7 +18,7 @@ from report.document.numbers import (
 from report.page.contact_maps import answer_maps, map_view, two_answers_maps
 from report.page.page_file import Data, banner, table_data
 from report.results.answer_record import STRESS, SavedAnswer, fasteners, pair_name, stages
-from report.results.series_results import Array
+from report.results.series_results import Array, allowed_mm
 
 CODE = ("machine", "commit", "clean", "recorded_at")
 #: The columns of a table of fasteners, but for their forces.
@@ -40,7 +40,7 @@ def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
 def stage_table(record: Data, arrays: dict[str, Array]) -> Table:
     """The history of a scene with stages: a line per stage; without stages, no line."""
     table = stages(record, arrays)
-    shown = beside((record.get("allowed_gap") or {}).get("allowed_mm", 0.0))
+    shown = beside(allowed_mm(record))
     columns = [Column("stage", lambda line: str(line["stage"]), "left")]
     columns += [number("largest gap, mm", "largest_mm", shown), word("at", "at")]
     columns += [number(name, name) for name in table.columns if name == STRESS]
@@ -104,7 +104,7 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
         at = position(arrays["contact_nodes"][worst], arrays["contact_nodes"])
     left = without_rounding(gap[worst], abs(arrays["gap_before"]).max())
     check = record.get("allowed_gap")
-    shown = beside(check["allowed_mm"] if check else 0.0)(left)
+    shown = beside(allowed_mm(record))(left)
     largest = f"the largest gap left is {shown} mm, at {at} ({pair_name(pair)})"
     if check is None:
         return {"kind": "", "text": f"{largest[0].upper()}{largest[1:]}."}

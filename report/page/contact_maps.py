@@ -15,7 +15,7 @@ from report.page.page_figures import map_item
 from report.page.page_file import Data, choice, exact, packed
 from report.results.answer_record import pair_name, stress_map
 from report.results.reader import Results
-from report.results.series_results import Array, Series
+from report.results.series_results import Array, Series, allowed_mm
 
 LARGEST_MAP = np.array([1100.0, 560.0])  # pixels
 BESIDE_MAP, BELOW_MAP = 165, 65  # pixels of the axes, the colours and the tools
@@ -53,9 +53,8 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     """
     fields = {text: arrays[name] for name, text in FIELDS.items()}
     gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
-    check, stress = record.get("allowed_gap") or {}, record.get("stress") or {}
     fields |= {f"gap of {stage['name']}": gap for stage, gap in gaps}
-    page = _pairs(record, fields, arrays, check.get("allowed_mm", np.inf))
+    page, stress = _pairs(record, fields, arrays, allowed_mm(record)), record.get("stress") or {}
     for k, part in enumerate(record["parts"] if "stress" in arrays else ()):
         places, highest, unread = stress_map(arrays, k)
         values, name = np.where(unread, np.nan, highest), f"stress of {part['name']}"
@@ -102,7 +101,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     step = _step(len(series.nodes))
     curves = _exceeded(series, step)
     maps = dict(zip(names, quantiles, strict=True))
-    name, limit = counted(len(series.cases), "case"), series.limit_mm
+    name, limit = counted(len(series.cases), "case"), allowed_mm(series.facts)
     _add_map(page, name, series.nodes, maps, series.fasteners, limit)
     (made,) = page["maps"]
     worst, spent, cases = series.worst_case, _size(made["fields"]) + len(curves), {}

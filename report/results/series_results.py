@@ -47,11 +47,6 @@ class Series:
     forces: Array
 
     @property
-    def limit_mm(self) -> float:
-        """The allowed gap, mm; infinite without one."""
-        return float((self.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf))
-
-    @property
     def marks(self) -> dict[str, list[list[float]]]:
         """The fasteners for a map of the junction."""
         return {"fasteners": self.fasteners.tolist()} if len(self.fasteners) else {}
@@ -80,6 +75,11 @@ class Series:
         for start in range(0, len(cases), rows):
             block = cases.iloc[start : start + rows]
             yield block, self.gaps[block["case"].to_numpy()].astype(float)
+
+
+def allowed_mm(facts: dict[str, Any]) -> float:
+    """The allowed gap of a series or an answer, mm; infinite without one."""
+    return float((facts.get("allowed_gap") or {}).get("allowed_mm", np.inf))
 
 
 def read(directory: Path) -> Series:

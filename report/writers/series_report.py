@@ -19,6 +19,7 @@ from report.results.series_results import (
     QUANTILES,
     Array,
     Series,
+    allowed_mm,
     convergence,
     exceedance,
     quantile_maps,
@@ -77,7 +78,7 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
 
 
 def _largest(series: Series) -> str:
-    largest = beside(series.limit_mm)(series.cases["max_gap_mm"].max())
+    largest = beside(allowed_mm(series.facts))(series.cases["max_gap_mm"].max())
     return f"{largest} mm, in case {series.worst_case}"
 
 
@@ -114,7 +115,7 @@ def _statistics(series: Series) -> Table:
     table = table.assign(figure=list(GAPS.values()), mean=figures.mean(), largest=figures.max())
     columns = [word("mm", "figure"), number("mean", "mean")]
     columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES]
-    columns.append(number("largest", "largest", beside(series.limit_mm)))
+    columns.append(number("largest", "largest", beside(allowed_mm(series.facts))))
     return Table("statistics", "*Quantiles over the cases.*", table, columns)
 
 
@@ -129,7 +130,7 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
     values = dict(zip([*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"], maps, strict=True))
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
     quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
-    larger = larger_than(series.limit_mm, gap)
+    larger = larger_than(allowed_mm(series.facts), gap)
     worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), [larger], series.marks)
     caption = "*The remaining gap at each contact: quantiles over the cases.*"
     of_worst = f"*The worst case: a largest gap of {_largest(series)}.*"
