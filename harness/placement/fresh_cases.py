@@ -19,13 +19,13 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
-from math import ceil, floor, isfinite, log, log10
+from math import ceil, floor, inf, isfinite, log, log10
 
 from harness.placement.candidates import Plan
 from harness.placement.plan_search import PlanSearch, Step
 from harness.scene.allowed_gap import CONFIDENCE, SHARE, share_interval
 from problems.errors import InputError
-from report.document.numbers import counted, no_less
+from report.document.numbers import beside, counted, raised
 
 ALPHA = 0.05
 POWER = 0.8
@@ -148,7 +148,7 @@ class Sample:
         plan = plan if step.plan else f"joints without a {self.item} keep"
         digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
         share, low, high = (f"{100 * value:.{digits}f}" for value in (self.kept / cases, *self.interval))
-        limit = no_less()(step.gap_mm) if goal.limit_mm is None else f"{goal.limit_mm:g}"
+        limit = beside(inf, raised)(step.gap_mm) if goal.limit_mm is None else f"{goal.limit_mm:g}"
         of = f"all {cases}" if self.kept == cases > 1 else f"{share} % of {cases}"
         interval = f"{100 * CONFIDENCE:g} % interval {low} to {high} %"
         return f"{plan} {limit} mm{goal.also} in {of} {self.cases} ({interval})"

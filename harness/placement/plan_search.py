@@ -11,7 +11,7 @@ import numpy as np
 from harness.placement.candidates import Plan
 from harness.placement.session import Outcome, Question
 from problems.reporter import SILENT, Reporter
-from report.document.numbers import counted, no_less
+from report.document.numbers import beside, counted, raised
 
 Ask: TypeAlias = Callable[[Sequence[Question]], list[list[Outcome]]]
 
@@ -61,7 +61,7 @@ class PlanSearch(ABC):
 
     def used(self, step: Step) -> str:
         """How much a plan needs of the limits, in words."""
-        return f"{no_less(self.limit_mm)(step.gap_mm)} mm"
+        return f"{beside(self.limit_mm, raised)(step.gap_mm)} mm"
 
     def order_of(self, best: Step) -> list[Step]:
         """The plans in the order of setting their items, the best last; by default the best alone."""

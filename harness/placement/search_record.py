@@ -12,7 +12,7 @@ from harness.placement.session import FastenerStudy
 from harness.results.provenance import stamp
 from problems.forms.assembly import Matrix
 from problems.storage import digest
-from report.document.numbers import counted, no_less, position
+from report.document.numbers import beside, counted, position, raised
 
 
 def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
@@ -80,7 +80,7 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
         leave = "leaves" if len(step.plan) == 1 else "leave"
         fasteners = f"{which}{counted(len(step.plan), 'fastener')}"
         gap, limit = step.gap_mm, goal.limit_mm
-        shown = no_less(inf if limit is None else limit)(gap)
+        shown = beside(inf if limit is None else limit, raised)(gap)
         words = f"{fasteners} {leave} {shown} mm in the one load case"
     if goal.limit_mm is None:
         return f"{words}, {'' if isfinite(step.gap_mm) else 'not '}proven.", True
@@ -92,6 +92,6 @@ def sentence_on(result: SearchOutcome, goal: Goal, nodes: Matrix) -> tuple[str, 
     at = position(nodes[step.outcome.contact[step.worst]], nodes)
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
-        words += f"; in {share} it is {no_less(goal.limit_mm)(step.gap_mm)} mm"
+        words += f"; in {share} it is {beside(goal.limit_mm, raised)(step.gap_mm)} mm"
     more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
     return f"FAIL: {words}, {more}; case {worst} is the worst, at {at}.", False

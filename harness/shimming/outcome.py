@@ -15,7 +15,7 @@ from harness.scene.mesh_error import estimated, mesh_record
 from harness.scene.solution import solve
 from problems.model.fastener_forces import fastener_forces
 from problems.scene_files import read_scene
-from report.document.numbers import counted, no_less, position, proven_to
+from report.document.numbers import beside, counted, position, proven_to, raised
 
 from .patches import BORDERS
 from .study import ShimStudy
@@ -32,8 +32,8 @@ def sentence_of(result: SearchOutcome, goal: Goal, study: ShimStudy) -> tuple[st
     least = step or min(result.steps, key=lambda step: step.gap_mm)
     figures = least.outcome.further[least.worst]
     gaps, more = np.array(figures[: len(study.masks)]), zip(figures[-2:], study.limits, UNITS, strict=True)
-    others = "".join(f", {no_less(most)(value)} {unit}" for value, most, unit in more if most < inf)
-    largest = no_less(limit)(gaps.max())
+    others = "".join(f", {beside(most, raised)(value)} {unit}" for value, most, unit in more if most < inf)
+    largest = beside(limit, raised)(gaps.max())
     leave = f"{largest} mm{others} of {goal.limit_mm:g} mm{goal.also} allowed"
     if step is None:
         words = "no shims of the stock are found with which all limits are kept; the best tried leave"

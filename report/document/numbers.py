@@ -17,11 +17,16 @@ def significant(value: object, digits: int = 3) -> str:
     number = as_number(value)
     if not number:
         return power(number)
-    rounded = float(f"{number:.{digits - 1}e}")
+    rounded = nearest(number, digits)
     exponent = math.floor(math.log10(abs(rounded)))
     if not -3 <= exponent < 5:
         return power(number, digits)
     return f"{rounded:.{max(0, digits - 1 - exponent)}f}"
+
+
+def nearest(value: float, digits: int = 3) -> float:
+    """A value rounded to so many digits."""
+    return float(f"{value:.{digits - 1}e}")
 
 
 def raised(bound: object, digits: int = 3) -> float | None:
@@ -29,8 +34,8 @@ def raised(bound: object, digits: int = 3) -> float | None:
     number = as_number(bound)
     if not number:
         return number
-    nearest = Decimal(f"{number:.{digits - 1}e}")
-    return float(nearest if float(nearest) >= number else nearest.next_plus(Context(prec=digits)))
+    rounded = Decimal(f"{number:.{digits - 1}e}")
+    return float(rounded if float(rounded) >= number else rounded.next_plus(Context(prec=digits)))
 
 
 def upwards(bound: float, digits: int = 2) -> str:
@@ -63,9 +68,11 @@ def without_rounding(least: float, largest: float) -> float:
     return 0.0 if abs(least) <= ROUNDING * abs(largest) else least
 
 
-def digits_beside(limit: float, value: float, least: int = 3) -> int:
-    """How many digits, at least so many, show a value on its side of a limit."""
-    return next(k for k in range(least, 18) if (float(f"{value:.{k - 1}e}") > limit) == (value > limit))
+def digits_beside(
+    limit: float, value: float, least: int = 3, rounded: Callable[[float, int], float | None] = nearest
+) -> int:
+    """How many digits, at least so many, show a rounded value on its side of a limit."""
+    return next(k for k in range(least, 18) if ((rounded(value, k) or 0.0) > limit) == (value > limit))
 
 
 def error_beside(limit: float, error: float) -> str:
@@ -73,25 +80,18 @@ def error_beside(limit: float, error: float) -> str:
     return f"{error:.{digits_beside(limit, error, least=4) - 1}e}"
 
 
-def beside(limit: float) -> Callable[[object], str]:
-    """Shows values with the digits that show them on their sides of a limit, and infinite ones as inf."""
+def beside(limit: float, rounded: Callable[[float, int], float | None] = nearest) -> Callable[[object], str]:
+    """Shows values with the digits that show them on their sides of a limit, and infinite ones as inf.
+
+    rounded : `raised` for bounds, so that what is shown is never less than the bound.
+    """
 
     def shown(value: object) -> str:
-        digits = digits_beside(limit, as_number(value) or 0.0)
-        return "inf" if value == math.inf else significant(value, digits)
-
-    return shown
-
-
-def no_less(limit: float = math.inf) -> Callable[[object], str]:
-    """As `beside`, for bounds: rounded upwards, so that what is shown is never less than the bound."""
-
-    def shown(bound: object) -> str:
-        number = as_number(bound)
+        number = as_number(value)
         if number is None:
-            return "inf" if bound == math.inf else MISSING
-        digits = next(k for k in range(3, 18) if ((raised(number, k) or 0.0) > limit) == (number > limit))
-        return significant(raised(number, digits), digits)
+            return "inf" if value == math.inf else MISSING
+        digits = digits_beside(limit, number, rounded=rounded)
+        return significant(rounded(number, digits), digits)
 
     return shown
 

@@ -13,6 +13,7 @@ from matplotlib.patches import Rectangle
 
 from report.document.numbers import beside, significant
 from report.results.answer_record import STRESS, SavedAnswer, pair_name, stages, stress_map, von_mises
+from report.results.series_results import allowed_mm
 
 from . import style
 from .deformed_faces import deformed_figure
@@ -72,9 +73,8 @@ def _pairs(
 
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     """Both gaps of each pair, with the closed contacts and those whose gap is larger than allowed."""
-    after, outlines = arrays["gap_after"], [(arrays["lam"] > 0, CLOSED, "closed contacts")]
-    if allowed := record.get("allowed_gap"):
-        outlines.append(larger_than(allowed["allowed_mm"], after))
+    after = arrays["gap_after"]
+    outlines = [(arrays["lam"] > 0, CLOSED, "closed contacts"), larger_than(allowed_mm(record), after)]
     gaps = ("gap before", arrays["gap_before"], ()), ("gap after", after, outlines)
     sides = [
         _pairs(name, (record, arrays), gap, rooted(f"{name}, mm", "viridis", gap), lines)
@@ -87,14 +87,15 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
     """`history`, the largest gap, the forces and the largest stress over the stages, and `stage-gaps`, on one
     scale; outlined: larger than allowed.
     """
-    table, allowed = stages(record, arrays), record.get("allowed_gap")
+    table, limit = stages(record, arrays), allowed_mm(record)
+    limited = limit < np.inf
     stressed = STRESS in table
     history = style.figure(4.2 + 1.6 * stressed)
     gap, force, *stress = history.subplots(2 + stressed, 1, sharex=True)
     gap.plot(table["stage"], table["largest_mm"], color=style.BLACK, marker="o")
-    ends = [*table["largest_mm"], (allowed or {}).get("allowed_mm", 0.0)]
-    if allowed:
-        gap.axhline(allowed["allowed_mm"], color=LARGER, linestyle="--", label="limit")
+    ends = [*table["largest_mm"], limit if limited else 0.0]
+    if limited:
+        gap.axhline(limit, color=LARGER, linestyle="--", label="limit")
         gap.legend()
     gap.set(ylabel="largest gap, mm", ylim=(min(0.0, *ends), 1.1 * max(ends) or None))
     names = [name for name in table.columns if name.endswith(", N")]
@@ -112,10 +113,9 @@ def stage_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str,
     maps = []
     told = zip(table.to_dict("records"), record["stages"], arrays["stage_gaps"], strict=True)
     for line, stage, values in told:
-        larger = [larger_than(allowed["allowed_mm"], values)] if allowed else []
         answer = record | {"marks": stage["marks"]}, arrays
-        here = _pairs(stage["name"], answer, values, scale, larger)
-        title = _outcome(line, allowed["allowed_mm"] if allowed else 0.0)
+        here = _pairs(stage["name"], answer, values, scale, [larger_than(limit, values)])
+        title = _outcome(line, limit)
         maps += [replace(item, title=title) for item in here] if len(here) == 1 else here
     return {"history": history, "stage-gaps": map_sheet(maps, 2)[0]}
 

@@ -110,8 +110,7 @@ def map_sheet(maps: Sequence[Map], beside: int, corners: Array | None = None) ->
 
 def _field(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappable:
     """Draw a field on the nodes, each in its cell."""
-    axes.set(aspect="equal", ylabel="y, mm")
-    axes.grid(visible=False)
+    axes.set_aspect("equal")
     look: dict[str, Any] = {"norm": scale.norm, "cmap": scale.colours}
     if (grid := grid_of(nodes)) is None:
         drawn = PolyCollection(cells_of(nodes), array=values, edgecolors="face", linewidths=0.3, **look)
@@ -153,14 +152,14 @@ def _sheet(
 
     middle, size : of the region, (x, y), mm. marks : the number of legend entries.
     """
-    rows, beside = -(-len(titles) // columns), RIGHT * bool(bars)
+    rows = -(-len(titles) // columns)
     ratio = size[1] / size[0]
-    room = (style.WIDTH - LEFT - beside - (columns - 1) * BESIDE) / columns
+    room = (style.WIDTH - LEFT - RIGHT - (columns - 1) * BESIDE) / columns
     width = min(room, TALLEST / ratio)
     height = width * ratio
     over = LETTER * min(max(map(len, titles)), LONGEST_LABEL)  # a title may be wider than its map
     across, down = max(width + BESIDE, over), max(height, LOWEST) + BELOW  # from a map to the next
-    wide = LEFT + (columns - 1) * across + max(width + beside, over)
+    wide = LEFT + (columns - 1) * across + max(width + RIGHT, over)
     long = (rows - 1) * down + height
     all_bars = max(long, bars * (SHORTEST + BELOW) - BELOW)
     top = TOP + (all_bars - long) / 2  # the maps in the middle of the bars
@@ -188,6 +187,6 @@ def _sheet(
         axes.xaxis.label.set_visible(last)
         maps.append(axes)
     right = LEFT + (columns - 1) * across + width + FROM_MAPS
-    bar = (all_bars + BELOW) / max(bars, 1) - BELOW
+    bar = (all_bars + BELOW) / bars - BELOW
     places = [placed(right, tall - TOP - bar - k * (bar + BELOW), BAR, bar) for k in range(bars)]
     return figure, maps, places, legend_columns

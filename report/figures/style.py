@@ -121,6 +121,12 @@ def figure(height: float) -> Figure:
     return Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.07))
 
 
+def single(height: float) -> tuple[Figure, Axes]:
+    """A figure of that height with one pair of axes."""
+    drawing = figure(height)
+    return drawing, drawing.subplots()
+
+
 def figure_above(height: float, handles: list[Line2D]) -> Figure:
     """A figure of that height with its legend below it."""
     drawing = figure(height + 0.2 * math.ceil(len(handles) / COLUMNS))

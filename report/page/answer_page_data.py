@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from report.document.blocks import number, word
+from report.document.blocks import Column, Table, number, word
 from report.document.numbers import (
     beside,
     coordinate,
@@ -17,8 +17,8 @@ from report.document.numbers import (
 )
 from report.page.contact_maps import answer_maps, map_view, two_answers_maps
 from report.page.page_file import Data, banner, table_data
-from report.results.answer_record import SavedAnswer, fasteners, pair_name, stages
-from report.results.series_results import Array
+from report.results.answer_record import STRESS, SavedAnswer, fasteners, pair_name, stages
+from report.results.series_results import Array, allowed_mm
 
 CODE = ("machine", "commit", "clean", "recorded_at")
 #: The columns of a table of fasteners, but for their forces.
@@ -29,27 +29,33 @@ FORCE = number("force, N", "force_N")
 
 def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
     """The data of the page of one answer. record, arrays : from solution.json and solution.npz."""
-    history = stage_lines(record, arrays)
-    stages_table = {"title": "Stages", "summary": "", "heads": history[0], "lines": history[1:]}
     page = _with_maps([record], facts(record), answer_maps(record, arrays))
-    more = [stages_table] if history[1:] else []
-    if len(forces := fasteners(record)):
+    history, forces = stage_table(record, arrays), fasteners(record)
+    more = [table_data("Stages", history.columns, history.data)] if len(history.data) else []
+    if len(forces):
         more.append(table_data("Forces in the fasteners", [*FASTENER, FORCE], forces))
     return page | {"headline": headline(record, arrays), "tables": [*more, *page["tables"]]}
 
 
-def stage_lines(record: Data, arrays: dict[str, Array]) -> list[list[str]]:
-    """The headings and the lines of the table of the stages; without stages, no line."""
+def stage_table(record: Data, arrays: dict[str, Array]) -> Table:
+    """The history of a scene with stages: a line per stage; without stages, no line."""
     table = stages(record, arrays)
-    shown = table.map(
-        lambda value: significant(value) if value is None or isinstance(value, float) else str(value)
-    )
-    if len(table):
-        allowed = (record.get("allowed_gap") or {}).get("allowed_mm", 0.0)
-        shown["largest_mm"] = table["largest_mm"].map(beside(allowed))
-        shown["closed"] = table["closed"].map(whole)  # no floats beside one that is not known
-    heads = [name.replace("_mm", " gap, mm") for name in shown.columns]
-    return [heads, *shown.to_numpy().tolist()]
+    shown = beside(allowed_mm(record))
+    columns = [Column("stage", lambda line: str(line["stage"]), "left")]
+    columns += [number("largest gap, mm", "largest_mm", shown), word("at", "at")]
+    columns += [number(name, name) for name in table.columns if name == STRESS]
+    columns += [number("closed", "closed", whole)]
+    columns += [number(name, name) for name in table.columns if name.endswith(", N")]
+    columns += [word("verdict", "verdict")] if "verdict" in table else []
+    caption = "*The stages.* The answer below is that of the last one; forces are sums."
+    return Table("stages", caption, table, columns)
+
+
+def stage_lines(record: Data, arrays: dict[str, Array]) -> list[list[str]]:
+    """The headings and the lines of the table of the stages, for the console."""
+    history = stage_table(record, arrays)
+    shown = table_data("Stages", history.columns, history.data)
+    return [shown["heads"], *shown["lines"]]
 
 
 def facts(record: Data) -> list[list[str]]:
@@ -98,7 +104,7 @@ def _gap_headline(record: Data, arrays: dict[str, Array]) -> Data:
         at = position(arrays["contact_nodes"][worst], arrays["contact_nodes"])
     left = without_rounding(gap[worst], abs(arrays["gap_before"]).max())
     check = record.get("allowed_gap")
-    shown = beside(check["allowed_mm"] if check else 0.0)(left)
+    shown = beside(allowed_mm(record))(left)
     largest = f"the largest gap left is {shown} mm, at {at} ({pair_name(pair)})"
     if check is None:
         return {"kind": "", "text": f"{largest[0].upper()}{largest[1:]}."}

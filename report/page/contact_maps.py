@@ -15,7 +15,7 @@ from report.page.page_figures import map_item
 from report.page.page_file import Data, choice, exact, packed
 from report.results.answer_record import pair_name, stress_map
 from report.results.reader import Results
-from report.results.series_results import Array, Series
+from report.results.series_results import Array, Series, allowed_mm
 
 LARGEST_MAP = np.array([1100.0, 560.0])  # pixels
 BESIDE_MAP, BELOW_MAP = 165, 65  # pixels of the axes, the colours and the tools
@@ -31,20 +31,19 @@ STRESS = "von Mises stress"
 
 
 def scene_maps(results: Results) -> Data:
-    """The maps of a run's scenes as far as they fit, and the names of those left out."""
-    page = _empty()
+    """The maps of a run's scenes as far as they fit; what they tell names those left out."""
+    page, left_out = _empty(), []
     for scene in results.cells.sort_values(["n", "active", "scene"])["scene"].unique():
-        arrays = results.scene_arrays(scene)
-        if arrays == {}:  # damaged
-            page["left_out"].append(scene)
-        elif arrays:
-            fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
-            marks = arrays.get("fasteners", NO_MARKS)
-            if not _add_map(page, scene, arrays["contact_nodes"], fields, marks, budget=BUDGET):
-                page["left_out"].append(scene)
-    if page["left_out"]:
+        if (arrays := results.scene_arrays(scene)) is None:
+            continue
+        fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
+        marks = arrays.get("fasteners", NO_MARKS)
+        damaged = not arrays
+        if damaged or not _add_map(page, scene, arrays["contact_nodes"], fields, marks, budget=BUDGET):
+            left_out.append(scene)
+    if left_out:
         for made in page["maps"]:
-            made["about"] += f" Left out, too large or damaged: {', '.join(page['left_out'])}."
+            made["about"] += f" Left out, too large or damaged: {', '.join(left_out)}."
     return page
 
 
@@ -54,16 +53,14 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     """
     fields = {text: arrays[name] for name, text in FIELDS.items()}
     gaps = zip(record.get("stages", []), arrays.get("stage_gaps", ()), strict=True)
-    check, stress = record.get("allowed_gap") or {}, record.get("stress") or {}
     fields |= {f"gap of {stage['name']}": gap for stage, gap in gaps}
-    page = _pairs(record, fields, arrays, check.get("allowed_mm"))
+    page, stress = _pairs(record, fields, arrays, allowed_mm(record)), record.get("stress") or {}
     for k, part in enumerate(record["parts"] if "stress" in arrays else ()):
         places, highest, unread = stress_map(arrays, k)
         values, name = np.where(unread, np.nan, highest), f"stress of {part['name']}"
         if len(places):
-            _add_map(
-                page, name, places, {STRESS: values}, _marked(record), stress.get("allowed"), noun="place"
-            )
+            limit = stress.get("allowed", np.inf)
+            _add_map(page, name, places, {STRESS: values}, _marked(record), limit, noun="place")
     return page
 
 
@@ -78,9 +75,7 @@ def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
     return page
 
 
-def _pairs(
-    record: Data, fields: dict[str, Array], arrays: dict[str, Array], limit: float | None = None
-) -> Data:
+def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array], limit: float = np.inf) -> Data:
     page = _empty()
     marks = _marked(record)
     for pair in record["pairs"] if "contact_nodes" in arrays else ():
@@ -106,12 +101,11 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     step = _step(len(series.nodes))
     curves = _exceeded(series, step)
     maps = dict(zip(names, quantiles, strict=True))
-    limit = (series.facts.get("allowed_gap") or {}).get("allowed_mm")
-    _add_map(page, counted(len(series.cases), "case"), series.nodes, maps, series.fasteners, limit)
+    name, limit = counted(len(series.cases), "case"), allowed_mm(series.facts)
+    _add_map(page, name, series.nodes, maps, series.fasteners, limit)
     (made,) = page["maps"]
-    worst, *others = _chosen(series)
-    spent, cases = _size(made["fields"]) + len(curves), {}
-    for case in (worst, *others):
+    worst, spent, cases = series.worst_case, _size(made["fields"]) + len(curves), {}
+    for case in _chosen(series):
         gaps = np.asarray(series.gaps[case, ::step], dtype=float)
         field = _field("gap", gaps, limit) | {"hover": False}
         spent += len(field["values"])
@@ -128,7 +122,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
 def _chosen(series: Series) -> Iterator[int]:
     """The worst case, then others at equal distances."""
     numbers = series.cases["case"].to_numpy()
-    worst = int(numbers[series.cases["max_gap_mm"].to_numpy().argmax()])
+    worst = series.worst_case
     yield worst
     for place in np.unique(np.linspace(0, len(numbers) - 1, CASES - 1).astype(int)):
         if numbers[place] != worst:
@@ -141,7 +135,7 @@ def _exceeded(series: Series, step: int) -> str:
     return packed(np.concatenate([np.quantile(gaps, shares, axis=0).T for gaps in series.of_contacts(step)]))
 
 
-def map_controls(page: Data) -> list[Data]:
+def _controls(page: Data) -> list[Data]:
     """The lists and numbers above the maps of a page, if it has any."""
     if not page["maps"]:
         return []
@@ -157,20 +151,16 @@ def map_controls(page: Data) -> list[Data]:
 
 
 def map_view(page: Data) -> Data:
-    """The view, the controls and the figure of a page that has maps alone."""
-    views = [("maps", "Gap maps")] if page["maps"] else []
-    figures = {"map": map_item(hover_names(page))}
-    return {"views": views, "controls": map_controls(page), "maps": page, "figures": figures}
-
-
-def hover_names(page: Data) -> list[str]:
-    """The fields told where the pointer is on a map of the page."""
+    """The view, the controls and the figure of a page's maps, which tells values where the pointer is."""
     fields = (item for made in page["maps"] for item in made["fields"].items())
-    return list(dict.fromkeys(name for name, field in fields if field["hover"]))
+    told = dict.fromkeys(name for name, field in fields if field["hover"])
+    views = [("maps", "Gap maps")] if page["maps"] else []
+    figures = {"map": map_item([*told])}
+    return {"views": views, "controls": _controls(page), "maps": page, "figures": figures}
 
 
 def _empty() -> Data:
-    return {"groups": [], "maps": [], "left_out": []}
+    return {"groups": [], "maps": []}
 
 
 def _add_map(
@@ -179,7 +169,7 @@ def _add_map(
     nodes: Array,
     fields: dict[str, Array],
     marks: Array,
-    limit: float | None = None,
+    limit: float = np.inf,
     budget: float = np.inf,
     noun: str = "contact",
 ) -> bool:
@@ -224,14 +214,14 @@ def _frame(nodes: Array) -> Data:
     }
 
 
-def _field(name: str, values: Array, limit: float | None) -> Data:
+def _field(name: str, values: Array, limit: float) -> Data:
     """A field with the range of its colours: gaps from the least, at most 0, forces from 1/10 000 of the
     most. limit : of a gap or a stress, above which contacts are outlined.
     """
     high = float(np.nanmax(values, initial=0.0)) or 1.0
     values = np.where(abs(values) <= ROUNDING * high, 0.0, values)
     force = name == FIELDS["lam"]
-    limit = None if force else limit
+    limit = np.inf if force else limit
     return {
         "kind": "force" if force else "gap",
         "unit": "N" if force else "N/mm²" if name == STRESS else "mm",
@@ -239,7 +229,7 @@ def _field(name: str, values: Array, limit: float | None) -> Data:
         "high": high,
         "hover": True,
         "limit": limit,
-        "values": packed(values, np.inf if limit is None else limit),
+        "values": packed(values, limit),
     }
 
 

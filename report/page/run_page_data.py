@@ -22,8 +22,8 @@ from report.analysis.time_to_solution import STAGES, stage_seconds
 from report.document.blocks import records
 from report.document.numbers import counted, listed
 from report.figures.style import line_styles
-from report.page.contact_maps import hover_names, map_controls, scene_maps
-from report.page.page_figures import PANELS, item, map_item, precision_figure
+from report.page.contact_maps import map_view, scene_maps
+from report.page.page_figures import PANELS, item, precision_figure
 from report.page.page_file import Data, banner, column
 from report.page.run_page_controls import limit_slider, row_filters, ways_to_show
 from report.results.reader import Results
@@ -82,7 +82,7 @@ OF_ONE_SOLVER = {
 
 def run_data(results: Results) -> Data:
     """The rows of a results directory, with the views, lists and figures of their page."""
-    cells, scenes, maps = _cells(results), _scenes(results), scene_maps(results)
+    cells, scenes, maps = _cells(results), _scenes(results), map_view(scene_maps(results))
     limits = cells["limit_asked_mm"].dropna().mode()
     limit_mm = float(limits.iloc[0]) if len(limits) else LIMIT_MM
     ladders = [scene for scene in scenes if scene["ladder"]]
@@ -91,13 +91,10 @@ def run_data(results: Results) -> Data:
     views = {"ladders": "Ladders"} if ladders else {}
     views |= {"matrix": "Matrix", "precision": "Work and precision"}
     views |= {"solver": "One solver"} if methods else {}
-    views |= {"maps": "Gap maps"} if maps["maps"] else {}
+    views |= dict(maps["views"])
     ranges = [_range(cells, ["reached_mm"]), _range(cells, ["load_case_s", "total_s", "scene_s"])]
     panel = precision_figure(*ranges)
-    figures = {
-        "map": map_item(hover_names(maps)),
-        "panels": [item(panel, f"panel-{k}") for k in range(min(PANELS, len(scenes)))],
-    }
+    panels = [item(panel, f"panel-{k}") for k in range(min(PANELS, len(scenes)))]
     return {
         "banner": _banner(results),
         "views": list(views.items()),
@@ -106,7 +103,7 @@ def run_data(results: Results) -> Data:
         "controls": [
             *ways_to_show(cells, len(ladders) == len(scenes), methods),
             *filters,
-            *map_controls(maps),
+            *maps["controls"],
         ],
         "filters": [control["name"] for control in filters],
         "methods": methods,
@@ -114,8 +111,8 @@ def run_data(results: Results) -> Data:
         "styles": {name: _look(style) for name, style in line_styles(cells).items()},
         "scenes": scenes,
         "cells": {name: column(cells[name]) for name in (*TEXTS, *NUMBERS)},
-        "maps": maps,
-        "figures": figures,
+        "maps": maps["maps"],
+        "figures": maps["figures"] | {"panels": panels},
     }
 
 

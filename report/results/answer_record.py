@@ -1,12 +1,12 @@
 """The answer of one scene: its record and arrays, and tables of its nodes, contacts and fasteners."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from harness.results import records
 from harness.results.schema import EXCEEDED
 from report.document.escape import quoted
 from report.document.numbers import position
@@ -18,9 +18,8 @@ SavedAnswer = tuple[dict[str, Any], dict[str, Array]]
 
 def read(directory: Path) -> SavedAnswer:
     """The content of solution.json and solution.npz."""
-    record = quoted(json.loads((directory / "solution.json").read_text("utf-8")))
-    with np.load(directory / "solution.npz") as saved:
-        return record, {name: saved[name] for name in saved.files}
+    record = quoted(records.read_object(directory / "solution.json"))
+    return record, records.read_arrays(directory / "solution.npz")
 
 
 def pair_name(pair: dict[str, Any]) -> str:

@@ -68,9 +68,8 @@ class Results:
         try:
             if not path.exists():
                 return None
-            with np.load(path) as file:
-                arrays = {name: file[name] for name in file.files}
-        except Exception:  # numpy, zipfile and zlib raise kinds of their own
+            arrays = records.read_arrays(path)
+        except (OSError, ValueError):
             return {}
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
             return {}

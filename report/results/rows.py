@@ -120,12 +120,8 @@ def _threads(number: float) -> str:
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
     """The values of a column (label, method, solver) in the order of all tables: owner, solver, form."""
     lines = cells.drop_duplicates(name)
-    places = [
-        (_place(owner, OWNERS), solver, form_place(form), str(label))
-        for owner, solver, form, label in zip(
-            lines["owner"], lines["solver"], lines["form"], lines[name], strict=True
-        )
-    ]
+    owner, form = lines["owner"].map(lambda owner: _place(owner, OWNERS)), lines["form"].map(form_place)
+    places = zip(owner, lines["solver"], form, lines[name].astype(str), strict=True)
     return [label for *_, label in sorted(places)]
 
 

@@ -52,6 +52,11 @@ class Series:
         return {"fasteners": self.fasteners.tolist()} if len(self.fasteners) else {}
 
     @property
+    def worst_case(self) -> int:
+        """The number of the case with the largest gap."""
+        return int(self.cases["case"].iloc[self.cases["max_gap_mm"].to_numpy().argmax()])
+
+    @property
     def independent(self) -> "Series":
         """The independent cases alone: of those for contributors, two of each base point."""
         per_point = self.facts.get("cases_per_point", 1)
@@ -70,6 +75,11 @@ class Series:
         for start in range(0, len(cases), rows):
             block = cases.iloc[start : start + rows]
             yield block, self.gaps[block["case"].to_numpy()].astype(float)
+
+
+def allowed_mm(facts: dict[str, Any]) -> float:
+    """The allowed gap of a series or an answer, mm; infinite without one."""
+    return float((facts.get("allowed_gap") or {}).get("allowed_mm", np.inf))
 
 
 def read(directory: Path) -> Series:

@@ -1,8 +1,9 @@
 """The sections of the report in their order.
 
-A section is a function from results to tables and the charts of them, or None if the results have nothing
-for it. SECTIONS names each function after the rows that it takes: "ladders" are rungs of ladders, "drawn" are
-scenes drawn at random, "scenes" are all but ladders and more than 40 drawn scenes, "all" are all rows.
+A section is a function from results with at least one row to tables and the charts of them, or to None if the
+rows have nothing for it. SECTIONS names each function after the rows that it takes: "ladders" are rungs of
+ladders, "drawn" are scenes drawn at random, "scenes" are all but ladders and more than 40 drawn scenes, "all"
+are all rows.
 """
 
 from collections.abc import Callable

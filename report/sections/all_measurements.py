@@ -28,9 +28,7 @@ FIGURES = [
 MARKS = {"within": "✓ within", "outside": "✗ outside", "cannot_be_judged": "? cannot be judged"}
 
 
-def section(results: Results) -> Section | None:
-    if results.cells.empty:
-        return None
+def section(results: Results) -> Section:
     facts = {problem.get("scene"): problem for problem in records(results.problems)}
     machine = plain(results.rows["machine"].iloc[0]) if results.one_of_several else ""
     blocks: list[Block] = []
@@ -109,9 +107,7 @@ Each measurement runs in its own process; the clock starts after the imports.
 To reproduce: `python -m harness run suite.toml --out again`, in the directory of `measurements.jsonl`."""
 
 
-def machine(results: Results) -> Section | None:
-    if results.rows.empty:
-        return None
+def machine(results: Results) -> Section:
     rows = results.rows
     facts = {"machine": rows["machine"].iloc[0]} | _flat(results.machines.get(rows["machine"].iloc[0], {}))
     times = sorted(time for time in rows["recorded_at"] if time)

@@ -65,9 +65,7 @@ COUNTED = {
 }
 
 
-def section(results: Results) -> Section | None:
-    if results.cells.empty:
-        return None
+def section(results: Results) -> Section:
     cells = with_outcomes(results.cells)
     order = in_order(cells)
     ladders = rungs_in_order(results, cells)
@@ -162,7 +160,7 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
 
 def rungs(results: Results) -> Section | None:
     """The rungs themselves, and the input that the model refuses."""
-    if results.cells.empty or "scene" not in results.problems:
+    if "scene" not in results.problems:
         return None
     problems = results.problems[results.problems["scene"].str.startswith(LADDERS)]
     problems = problems.drop_duplicates("scene", keep="last").reset_index(drop=True)

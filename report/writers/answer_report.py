@@ -4,6 +4,7 @@ with maps, and a sheet to file.
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +12,19 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
-from report.document.numbers import beside, extent, raised, significant, whole
+from report.document.numbers import extent, raised, significant, whole
 from report.figures.answer_maps import answer_figures
 from report.figures.node_cells import grid_of
-from report.page.answer_page_data import FASTENER, FORCE, answer_data, facts, headline
+from report.page.answer_page_data import FASTENER, FORCE, answer_data, facts, headline, stage_table
 from report.page.page_file import write as write_page
 from report.results.answer_record import (
+    STRESS,
     closed_contacts,
     contacts,
     fasteners,
     nodes,
     pair_name,
     read,
-    stages,
     stresses,
     von_mises,
 )
@@ -70,7 +71,10 @@ def write(directory: Path) -> Path:
         if "stress" in arrays and vtu == "solution.vtu":
             vtu = f"{vtu}, {write_vtu(directory / 'stress.vtu', record, arrays, grid_with_stresses)}"
     drawn = {name: Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()}
-    blocks += [*_stages(record, arrays)]
+    history = stage_table(record, arrays)
+    if len(history.data):
+        columns = [column for column in history.columns if column.heading != STRESS]
+        blocks.append(replace(history, columns=columns))
     blocks += [
         drawn.pop(name) for name in ("history", "stage-gaps", "gap", "section", "deformed") if name in drawn
     ]
@@ -82,8 +86,10 @@ def write(directory: Path) -> Path:
     title = str(record["title"])
     write_page(directory / "index.html", title, answer_data(record, arrays))
     sections = [Section("The answer", blocks), Section("How sure it is", sure)]
-    if skipped := _skipped(record):
-        sections.append(Section("What was skipped", skipped))
+    digits = f"The matrices were given. {record['digits']}." if record["digits"] else ""
+    skipped = "\n".join(f"- {line}" for line in record["skipped"])
+    if told := [Text(text) for text in (digits, skipped) if text]:
+        sections.append(Section("What was skipped", told))
     verdict = [f"**{headline(record, arrays)['text']}**"]
     verdict += [f"> **Warning.** {sentence}." for sentence in record.get("unusual", ())]
     page = written(directory / "answer.md", title, sections, verdict, files)
@@ -144,28 +150,8 @@ def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
     return [*blocks, Table("", "*The parts.*", pd.DataFrame(parts), columns)]
 
 
-def _stages(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
-    """The history of a scene with stages; `stages.csv` has it, too."""
-    if "stages" not in record:
-        return []
-    table = stages(record, arrays)
-    shown = beside((record.get("allowed_gap") or {}).get("allowed_mm", 0.0))
-    columns = [word("stage", "stage"), number("largest gap, mm", "largest_mm", shown), word("at", "at")]
-    columns += [number("closed", "closed", whole)]
-    columns += [number(name, name) for name in table.columns if name.endswith(", N")]
-    columns += [word("verdict", "verdict")] if "verdict" in table else []
-    caption = "*The stages.* The answer below is that of the last one; forces are sums."
-    return [Table("stages", caption, table, columns)]
-
-
 def _range(heading: str, name: str) -> Column:
     return Column(heading, lambda row: extent(row[name]))
-
-
-def _skipped(record: dict[str, Any]) -> list[Block]:
-    lines = [f"- {line}" for line in record["skipped"]]
-    digits = [f"The matrices were given. {record['digits']}."] if record["digits"] else []
-    return [Text(text) for text in (*digits, "\n".join(lines)) if text]
 
 
 def write_vtu(

@@ -98,7 +98,13 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
         sections.append(Section(f"{pair.old} → {pair.new}", blocks))
     lines = pd.concat([pair.table.assign(old=pair.old, new=pair.new) for pair in comparisons])
     title = f"Compared with {comparisons[0].old}"
-    write_page(out / "index.html", title, comparison_data(comparisons))
+    data: Data = {
+        "banner": _banner(pd.concat([pair.rows for pair in comparisons])),
+        "tables": [
+            table_data(f"{pair.old} → {pair.new}", COLUMNS, pair.table, pair.summary) for pair in comparisons
+        ],
+    }
+    write_page(out / "index.html", title, data)
     return written(out / "comparison.md", title, sections, files={"comparison": lines})
 
 
@@ -110,16 +116,6 @@ def _blocks(pair: Comparison, prefix: str) -> list[Block]:
     if len(solvers := by_solver(pair.table)):
         blocks.append(Table(f"{prefix}solvers", "*Solver by solver.*", solvers, SOLVERS))
     return blocks
-
-
-def comparison_data(comparisons: list[Comparison]) -> Data:
-    """The data of the page."""
-    return {
-        "banner": _banner(pd.concat([pair.rows for pair in comparisons])),
-        "tables": [
-            table_data(f"{pair.old} → {pair.new}", COLUMNS, pair.table, pair.summary) for pair in comparisons
-        ],
-    }
 
 
 def _banner(rows: pd.DataFrame) -> Data:

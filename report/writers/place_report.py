@@ -1,6 +1,5 @@
 """Writes the report of a search for a plan of fasteners: report.md with pictures, and plan.csv, order.csv."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,9 +8,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.ticker import MaxNLocator
 
+from harness.results import records
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import coordinate, counted, no_less, out_of, significant, whole
+from report.document.numbers import beside, coordinate, counted, out_of, raised, significant, whole
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.results.series_results import read as read_series
@@ -31,7 +31,7 @@ FAMILIES = {
 
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report/report.md from the record and the series in DIRECTORY. Returns its path."""
-    record = quoted(json.loads((directory / "place.json").read_text("utf-8")))
+    record = quoted(records.read_object(directory / "place.json"))
     steps = pd.DataFrame(record["steps"]).astype({"gap_mm": float})  # NaN where nothing is proven
     title = f"Where fasteners go: {record['title']}"
     with style.applied():
@@ -99,7 +99,7 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
             line = (kept if len(kept) else most).iloc[0]
             lines.append({"family": text, **line[["fasteners", "gap_mm"]], "kept": line["gap_mm"] <= limit})
     columns = [word("plan", "family"), number("fasteners", "fasteners", whole)]
-    columns.append(number("gap, mm", "gap_mm", no_less(limit)))
+    columns.append(number("gap, mm", "gap_mm", beside(limit, raised)))
     if record["limit_mm"] is not None:
         columns.append(Column("within the limit", lambda line: "yes" if line["kept"] else "no", "left"))
     caption = (
@@ -110,8 +110,7 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
 
 
 def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
-    drawing = style.figure(3.4)
-    axes = drawing.subplots()
+    drawing, axes = style.single(3.4)
     for name, (text, colour, marker, line) in FAMILIES.items():
         plans = steps[steps["moved"] == name].sort_values("fasteners")
         if len(plans):
@@ -173,14 +172,13 @@ def _order(record: dict[str, Any]) -> list[Block]:
         at |= {"name": labels.get((x, y), "")} if labels else {}
         lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]} | at)
     table = pd.DataFrame(lines)
-    drawing = style.figure(3.0)
-    axes = drawing.subplots()
+    drawing, axes = style.single(3.0)
     axes.plot(table["set"], table["gap_mm"], color=style.BLUE, marker="o", ms=4)
     axes.set(xlabel="fasteners set", ylabel="largest gap, mm", ylim=(0, None))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     columns = [number("set", "set", whole), *([word("hole", "name")] if labels else [])]
     columns += [number(f"{axis}, mm", f"{axis}_mm", coordinate) for axis in "xy"]
-    columns.append(number("gap after it, mm", "gap_mm", no_less(record["limit_mm"] or 0.0)))
+    columns.append(number("gap after it, mm", "gap_mm", beside(record["limit_mm"] or 0.0, raised)))
     caption = "*The order that keeps the gap small*: the reverse of removing what is needed least."
     return [
         Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),

@@ -4,8 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Drawing
 
 from report.analysis.checks import code_warnings
 from report.document.blocks import Figure, Section, Table, Text, facts_table, number, word
@@ -21,6 +19,7 @@ from report.results.series_results import (
     QUANTILES,
     Array,
     Series,
+    allowed_mm,
     convergence,
     exceedance,
     quantile_maps,
@@ -40,10 +39,7 @@ CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": 
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md from the series in DIRECTORY, with index.html and sheet.pdf beside it.
-
-    Returns the path of report.md.
-    """
+    """Write report/report.md of the series in DIRECTORY, with a page and a sheet; returns its path."""
     series = read(directory)
     check = series.facts.get("allowed_gap")
     verdict = [Text(f"**{check['said'][-1]}** {' '.join(check['said'][:-1])} {WHERE}")] if check else []
@@ -59,10 +55,9 @@ def write(directory: Path) -> Path:
         sections.append(Section("The remaining gap", blocks))
         data = series_data(series, maps, curve)
     target = emptied(directory / "report")
+    page = written(target / "report.md", title, sections)
     if data:
         write_page(target / "index.html", title, data)
-    page = written(target / "report.md", title, sections)
-    if len(series.cases):
         write_sheet(target / "sheet.pdf", _sheet(series, directory, target))
     return page
 
@@ -76,21 +71,15 @@ def _sheet(series: Series, directory: Path, target: Path) -> Sheet:
     record = facts | {
         "commit": series.code["commit"].iloc[-1],
         "scene_key": facts["identity"].get("scene_key"),
+        "version": (facts.get("versions") or {}).get("rivetbench", ""),
     }
-    record["version"] = (facts.get("versions") or {}).get("rivetbench", "")
     about = origin(record), facts.get("inputs", {}), [file for file in pictures if file.exists()][:2]
     return Sheet(str(facts["title"]), check["kind"], verdict, sure, *about, [_statistics(series)])
 
 
 def _largest(series: Series) -> str:
-    largest = series.cases["max_gap_mm"]
-    worst = int(series.cases["case"].to_numpy()[largest.to_numpy().argmax()])
-    return f"{beside(_limit(series))(largest.max())} mm, in case {worst}"
-
-
-def _limit(series: Series) -> float:
-    """The allowed gap, mm; infinite without one."""
-    return float((series.facts.get("allowed_gap") or {}).get("allowed_mm", np.inf))
+    largest = beside(allowed_mm(series.facts))(series.cases["max_gap_mm"].max())
+    return f"{largest} mm, in case {series.worst_case}"
 
 
 def _summary(series: Series) -> Table:
@@ -126,7 +115,7 @@ def _statistics(series: Series) -> Table:
     table = table.assign(figure=list(GAPS.values()), mean=figures.mean(), largest=figures.max())
     columns = [word("mm", "figure"), number("mean", "mean")]
     columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES]
-    columns.append(number("largest", "largest", beside(_limit(series))))
+    columns.append(number("largest", "largest", beside(allowed_mm(series.facts))))
     return Table("statistics", "*Quantiles over the cases.*", table, columns)
 
 
@@ -135,13 +124,13 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
     nodes = series.nodes
     if nodes is None:
         return []
-    case = int(series.cases["case"].iloc[series.cases["max_gap_mm"].to_numpy().argmax()])
+    case = series.worst_case
     gap = np.asarray(series.gaps[case], dtype=float)
     places = pd.DataFrame(nodes[:, :2], columns=["x_mm", "y_mm"])
     values = dict(zip([*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"], maps, strict=True))
     scale = rooted("gap, mm", "viridis", *(values[f"q{q:g}_mm"] for q in MAPPED))
     quantiles = [Map(PERCENT[q], nodes, values[f"q{q:g}_mm"], scale, (), series.marks) for q in MAPPED]
-    larger = larger_than(_limit(series), gap)
+    larger = larger_than(allowed_mm(series.facts), gap)
     worst = Map(f"case {case}", nodes, gap, rooted("gap, mm", "viridis", gap), [larger], series.marks)
     caption = "*The remaining gap at each contact: quantiles over the cases.*"
     of_worst = f"*The worst case: a largest gap of {_largest(series)}.*"
@@ -152,7 +141,7 @@ def _maps(series: Series, maps: Array) -> list[Figure]:
 
 
 def _exceedance(curve: pd.DataFrame, cases: int) -> Figure:
-    drawing, axes = _axes()
+    drawing, axes = style.single(3.2)
     for (name, label), (colour, line) in zip(CURVES.items(), LOOKS, strict=False):
         shown = curve[curve[name] > 0]
         axes.plot(shown["gap_mm"], 100 * shown[name], line, color=colour, label=label)
@@ -165,7 +154,7 @@ def _exceedance(curve: pd.DataFrame, cases: int) -> Figure:
 
 def _convergence(series: Series) -> Figure:
     table = convergence(series)
-    drawing, axes = _axes()
+    drawing, axes = style.single(3.2)
     for q, (colour, line) in zip(QUANTILES[1:], LOOKS, strict=True):
         lines = table[table["quantile"] == q]
         axes.plot(lines["cases"], lines["gap_mm"], line, marker=".", color=colour, label=PERCENT[q])
@@ -183,7 +172,7 @@ def _convergence(series: Series) -> Figure:
 def _swept(series: Series, key: str) -> Figure:
     ranges = series.cases.groupby(key)[list(GAPS)].agg(["min", "median", "max"])
     ranges.columns = ["_".join(pair) for pair in ranges.columns.to_flat_index()]
-    drawing, axes = _axes()
+    drawing, axes = style.single(3.2)
     for (name, label), (colour, line) in zip(GAPS.items(), LOOKS, strict=False):
         middle, low, high = (ranges[f"{name}_{end}"] for end in ("median", "min", "max"))
         axes.plot(ranges.index, middle, line, color=colour, marker="o", markersize=3, label=label)
@@ -198,11 +187,6 @@ def _swept(series: Series, key: str) -> Figure:
             "acts where no gap is left."
         )
     return Figure(f"sweep-{file_name(key)}", caption, drawing, ranges.reset_index())
-
-
-def _axes() -> tuple[Drawing, Axes]:
-    drawing = style.figure(3.2)
-    return drawing, drawing.subplots()
 
 
 def series_data(series: Series, quantiles: Array, curve: pd.DataFrame) -> Data:

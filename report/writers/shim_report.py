@@ -1,6 +1,5 @@
 """Writes the report of a search for shims: report.md with a drawing and tables, index.html, and sheet.pdf."""
 
-import json
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Mapping
@@ -14,9 +13,10 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Polygon, Rectangle
 
+from harness.results import records
 from report.document.blocks import Block, Column, Figure, Section, Table, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import coordinate, counted, no_less, significant, whole
+from report.document.numbers import beside, coordinate, counted, raised, significant, whole
 from report.figures import style
 from report.page.page_file import Data, banner, table_data
 from report.page.page_file import write as write_page
@@ -31,11 +31,8 @@ NEAR = 0.9  # of the limit: a gap is at it
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report.md from the record in DIRECTORY, with index.html and sheet.pdf beside it.
-
-    Returns the path of report.md.
-    """
-    record = quoted(json.loads((directory / "shim.json").read_text("utf-8")))
+    """Write DIRECTORY/report.md from the record in DIRECTORY, with a page and a sheet; returns its path."""
+    record = quoted(records.read_object(directory / "shim.json"))
     patches = pd.DataFrame(record["patches"]).astype(dict.fromkeys(COLUMNS.values(), float))  # NaN: not known
     title = f"Shims: {record['title']}"
     label, what, heads = "thickness_mm", "thickness in mm", [number("thickness, mm", "thickness_mm")]
@@ -114,7 +111,9 @@ def _largest(record: dict[str, Any], key: str, shims: int) -> str:
     unit, name = LIMITS[key]
     if record[name] is None:
         return ""
-    before, after = (f"{no_less(record[name])(record[when][key])} {unit}" for when in ("before", "after"))
+    before, after = (
+        f"{beside(record[name], raised)(record[when][key])} {unit}" for when in ("before", "after")
+    )
     chose, fresh = (" in the cases that chose", " in the fresh cases") if record["samples"] else ("", "")
     at = f", at {record['worst_at']}" if key == "gap" else ""
     if shims:
@@ -132,8 +131,7 @@ def _stock(pieces: pd.DataFrame, sizes: list[str]) -> list[Block]:
     of = {"pieces": ("joint", "size"), "joints": ("joint", "nunique"), "area_mm2": ("area_mm2", "sum")}
     table = pieces.groupby(sizes).agg(**of).reset_index()
     names = [" to ".join(f"{t:g}" for t in row) for row in table[sizes].to_numpy()]
-    drawing = style.figure(2.6)
-    axes = drawing.subplots()
+    drawing, axes = style.single(2.6)
     axes.bar(names, table["pieces"], color=style.BLUE)
     axes.set(xlabel="thickness, mm", ylabel="pieces")
     heads = "thickness, mm", "at its other end, mm"
@@ -155,8 +153,7 @@ def _range(axis: str, line: Mapping[str, Any]) -> str:
 def _drawing(record: dict[str, Any], shims: pd.DataFrame, label: str) -> Drawing:
     """The junction with each shim, its name and what `label` has of it; the ticks are borders of shims."""
     (west, south), (east, north) = record["bounds"]
-    drawing = style.figure(min(max(style.WIDTH * (north - south) / (east - west), 2.2), style.WIDTH))
-    axes = drawing.subplots()
+    drawing, axes = style.single(min(max(style.WIDTH * (north - south) / (east - west), 2.2), style.WIDTH))
     axes.add_patch(Rectangle((west, south), east - west, north - south, fill=False))
     corners = [np.array(outline) for outline in shims["outline"]]
     for outline, (_, line) in zip(corners, shims.iterrows(), strict=True):

@@ -21,9 +21,7 @@ LONG = 4  # sections, from which a report begins with links to them
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md from the results in DIRECTORY, and index.html beside it.
-
-    Returns the path of report.md.
+    """Write DIRECTORY/report/report.md from the results in DIRECTORY, and a page beside it; returns its path.
 
     Raises FileNotFoundError if DIRECTORY has no measurements.jsonl.
     """

@@ -19,8 +19,7 @@ def write(directory: Path, key: str, share: float, said: Sequence[str], shares: 
     key, said = quoted(key), [*map(quoted, said)]  # with the name of a scene
     table = pd.DataFrame(shares).sort_values(["fresh", "value"])
     with style.applied():
-        drawing = style.figure(3.2)
-        axes = drawing.subplots()
+        drawing, axes = style.single(3.2)
         for fresh, (colour, label) in LOOKS.items():
             rows = 100 * table.loc[table["fresh"] == fresh, ["share", "low", "high"]]
             ends = abs(rows[["low", "high"]].sub(rows["share"], axis=0)).to_numpy().T

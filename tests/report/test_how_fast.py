@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from synthetic_results import results, row
+from synthetic_results import results, row, times
 
 from report.results.reader import read
 from report.sections import time_to_solution
@@ -29,8 +29,7 @@ def rows() -> list[dict[str, Any]]:
     made = []
     for solver, form, owner, seconds in LINES:
         for k, taken in enumerate(seconds):
-            times = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "form_s"), 0.0)
-            figures: dict[str, Any] = times | {"solve_s": taken or 1.0, "owner": owner}
+            figures: dict[str, Any] = times(solve_s=taken or 1.0) | {"owner": owner}
             figures |= {"model_s": 0.5} if form == "sparse" else {"stages": "K factors Q"}
             figures |= {} if taken else {"verdict": "outside"}
             made.append(row(f"4386/{k}", solver, form, **figures))
@@ -92,16 +91,11 @@ def test_a_case_of_a_series_with_its_proof_is_compared_with_later_cases(tmp_path
     made = []
     for solver, owner, seconds in (("a", "library", (9.0, 4.0, 2.0)), ("b", "textbook", (1.0, 1.5, 1.5))):
         for case, taken in enumerate(seconds):
-            times = {"setup_s": 0.0, "solve_s": taken, "form_s": 0.0, "warm": owner == "library" and case > 0}
-            made.append(row("4386/1074", solver, "dual", owner=owner, case=case, **times))
+            figures = times(solve_s=taken) | {"case": case, "warm": owner == "library" and case > 0}
+            made.append(row("4386/1074", solver, "dual", owner=owner, **figures))
     rows, proven = results(tmp_path, made, *PROBLEMS).rows, {"4386/1074": pd.Series([0.1, 0.2])}
     (line,) = in_series(rows, proven).to_dict("records")
-    assert (line["n"], line["scenes"], line["seconds"], line["seconds_most"]) == (
-        4386,
-        1,
-        pytest.approx(0.15),
-        0.2,
-    )
-    assert (line["library"], line["textbook"]) == (pytest.approx(20.0), pytest.approx(10.0))
+    figures = [line[name] for name in ("n", "scenes", "seconds", "seconds_most", "library", "textbook")]
+    assert figures == pytest.approx([4386, 1, 0.15, 0.2, 20.0, 10.0])
     without = in_series(rows[rows["owner"] == "library"], proven)
     assert " – |" in time_to_solution.how_fast_table(without).markdown

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import pytest
 from commands import harness
-from synthetic_results import no_answer, results, row, table, write_rows
+from synthetic_results import HIGH, LOW, no_answer, results, row, table, times, write_rows
 
 from report.analysis.standings import shown, standings
 from report.document.blocks import Figure
@@ -20,12 +20,7 @@ from report.sections.speed import contacts
 from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard, summary
 from report.writers.suite_report import write
 
-LOW, HIGH = "4386/0100", "4386/1000"
-
-
-def times(**seconds: float) -> dict[str, float]:
-    """A row's times: nothing but these."""
-    return dict.fromkeys(("convert_s", "prepare_s", "setup_s", "solve_s", "form_s"), 0.0) | seconds
+pytestmark = pytest.mark.usefixtures("without_pictures")
 
 
 def outside(error: float) -> dict[str, Any]:
@@ -109,7 +104,6 @@ def test_a_profile_is_the_share_of_scenes_within_a_factor_of_the_fastest(tmp_pat
     assert fewer.loc[fewer["method"] == "b (dual)", "share"].tolist() == [0.5, 1.0]
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_a_log_is_linked_where_it_is_one_of_the_run(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/a.txt").write_text("iter 1\n")
@@ -130,7 +124,6 @@ def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> N
     assert math.isnan(cells.loc[HIGH, "load_case_s"])
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
     rows = [row(LOW, "a", machine=name, **times(solve_s=t)) for name, t in (("First", 1.0), ("Second", 9.0))]
     text = write(write_rows(tmp_path, rows)).read_text("utf-8")
@@ -141,7 +134,6 @@ def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("owner", [{}, {"owner": None}, {"owner": "theirs"}])
-@pytest.mark.usefixtures("without_pictures")
 def test_foreign_rows_are_shown(owner: dict[str, Any], tmp_path: Path) -> None:
     """With no owner or another, which comes last; the names of scenes have fewer parts than ours, or more."""
     rows = []
@@ -175,7 +167,6 @@ def test_a_report_that_cannot_be_made_leaves_the_older_one(
     assert sorted(path.name for path in (tiny / "report").iterdir()) == ["a.png", "report.md"]
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
     text = write(tiny).read_text("utf-8")
     shown = re.findall(r"\[CSV\]\(([^)]+)\)\)\n\n((?:\|.*\n)+)", text)
@@ -195,31 +186,6 @@ def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
     assert re.search(r"\| c \(dual\) .* time limit .* > 60 s \(time limit\) \|", text)
 
 
-@pytest.mark.usefixtures("without_pictures")
-def test_what_is_mixed_or_missing_is_said(tmp_path: Path) -> None:
-    rows = [row(LOW, "a", solver_version="1.0"), row(HIGH, "a", solver_version="1.1", threads=1)]
-    write_rows(tmp_path, rows)
-    plan = f'scenes = ["{LOW}", "{HIGH}"]\n[[solver]]\nname = "a"\nforms = ["dual", "primal"]\n'
-    (tmp_path / "suite.toml").write_text(plan, "utf-8")
-    text = write(tmp_path).read_text("utf-8")
-    assert "2 of 4 combinations of scene, solver and form" in text
-    assert "a was run in several versions: 1.0 and 1.1." in text
-    assert "In 1 row (a) the number of threads in effect was not the requested one" in text
-
-
-def test_several_tolerances_and_threads_stand_in_the_label(tmp_path: Path) -> None:
-    rows = [row(LOW, "a", tolerance=tol) for tol in (1e-6, 1e-9)]
-    rows += [row(LOW, "b", threads=k, threads_asked=k) for k in (1, 2)] + [row(LOW, "c", variant="direct")]
-    labels = {
-        "a (dual) 1e-6",
-        "a (dual) 1e-9",
-        "b (dual) × 1 thread",
-        "b (dual) × 2 threads",
-        "c (dual) direct",
-    }
-    assert set(results(tmp_path, rows).cells["label"]) == labels
-
-
 def test_a_run_without_an_answer_stands_with_the_others_of_its_method(tmp_path: Path) -> None:
     """A killed run does not say how many threads were in effect, which is not what was asked for."""
     scenes = [f"4386/{k:04d}" for k in range(5)]
@@ -234,19 +200,20 @@ def test_a_run_without_an_answer_stands_with_the_others_of_its_method(tmp_path: 
 
 
 def test_what_is_a_row_of_its_own_is_a_line_of_its_own(tmp_path: Path) -> None:
-    """Options, load cases solved at once and threads asked for, where two of them are on one scene."""
+    """Options, load cases solved at once, threads asked for and tolerances, where two are on one scene."""
     rows = [row(LOW, "a", options={"k": k, "via": "x"}) for k in (1, 2)]
     rows += [row(LOW, "b", batched_asked=k, batched=1) for k in (8, 16, None)]
-    rows += [row(LOW, "c", threads=2, threads_asked=k) for k in (2, 4)]
+    rows += [row(LOW, "c", threads=2, threads_asked=k) for k in (1, 4)]
     rows += [row(LOW, "d", batched_asked=8), row(HIGH, "d", batched_asked=4)]
     rows += [row(scene, "e", options={"k": 1}) for scene in (LOW, HIGH)]
+    rows += [row(LOW, "f", variant="direct", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
     read_back = results(tmp_path, rows)
     assert (len(read_back.rows), read_back.left_out) == (len(rows), 0)
-    assert set(read_back.cells["method"]) == {
+    assert set(read_back.cells["label"]) == {
         *(f'a (dual) k = {k}, via = "x"' for k in (1, 2)),
         *("b (dual) 8 at once", "b (dual) 16 at once", "b (dual)"),
-        *(f"c (dual) × {k} threads" for k in (2, 4)),
-        *("d (dual)", "e (dual)"),
+        *("c (dual) × 1 thread", "c (dual) × 4 threads", "d (dual)", "e (dual)"),
+        *("f (dual) direct 1e-6", "f (dual) direct 1e-9"),
     }
 
 

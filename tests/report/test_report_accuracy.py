@@ -142,12 +142,8 @@ def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:
         *(18, 18, 8, 6),
     ]
     assert trust.loc["honest (dual)", ["above_tolerance", "tight", "tight_outside"]].tolist() == [0, 8, 0]
-
-
-def test_only_runs_called_solved_can_break_their_word(tmp_path: Path) -> None:
-    rows = changed(sweep(), "liar", status="inaccurate")
-    trust = accuracy.trust(results(tmp_path, rows)).set_index("method")
-    assert "liar (dual)" not in trust.index
+    rows = changed(sweep(), "liar", status="inaccurate")  # without a promise
+    assert "liar (dual)" not in set(accuracy.trust(results(tmp_path / "inaccurate", rows))["method"])
 
 
 def test_what_the_reference_leaves_open_is_in_the_solvers_favour(tmp_path: Path) -> None:

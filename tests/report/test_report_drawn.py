@@ -12,6 +12,7 @@ from report.document.blocks import Figure, Section
 from report.sections import random_scenes as drawn_scenes
 from report.writers.suite_report import write
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
 SECONDS = {
     **{("newton", "dual"): 0.05, ("mprgp", "dual"): 0.1},
     **{("newton", "sparse"): 0.3, ("mprgp", "sparse"): 0.4},
@@ -109,11 +110,10 @@ def test_the_report_keeps_many_drawn_scenes_apart(tmp_path: Path, monkeypatch: p
     assert "## Scenes drawn at random" in page
     assert "**Scene 4386/0107**" in page
     assert "**Scene drawn/" not in page
-    assert (tmp_path / "report" / "drawn.png").stat().st_size > 1000
+    assert (tmp_path / "report" / "drawn.png").is_file()
     assert pd.read_csv(tmp_path / "report" / "drawn.csv")["n"].to_list() == [4386] * 4 + [6112]
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_a_series_on_many_drawn_scenes_is_in_the_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -124,7 +124,6 @@ def test_a_series_on_many_drawn_scenes_is_in_the_report(
     assert len(pd.read_csv(tmp_path / "report" / "series.csv")) == SCENES
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_nothing_but_failures_is_a_section_too(tmp_path: Path) -> None:
     rows = [row | no_answer("not_run") for row in every_row()]
     write(write_rows(tmp_path, [*rows, every_row()[0] | {"n": None, "scene": "drawn/"}]))
@@ -154,7 +153,5 @@ def test_superelements_are_compared_with_the_textbook_with_preparation(tmp_path:
     assert table(section, "drawn").data["n"].to_list() == [4386] * 4
     assert len(table(section, "drawn-failures").data) == 1
     missed = section_of(tmp_path / "missed", [*rows[:-4], rows[-4] | no_answer("time_limit"), *rows[-3:]])
-    assert (
-        table(missed, "drawn-superelements").data.set_index("method").loc["newton (dual)", "worst_ratio"]
-        == np.inf
-    )
+    lines = table(missed, "drawn-superelements").data.set_index("method")
+    assert lines.loc["newton (dual)", "worst_ratio"] == np.inf

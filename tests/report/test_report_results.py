@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from synthetic_results import row, write_rows
+from synthetic_results import HIGH, LOW, row, write_rows
 
 from report.analysis import checks
 from report.analysis.checks import warnings
@@ -13,9 +13,7 @@ from report.results.reader import read
 from report.results.rows import in_order
 from report.writers.suite_report import write
 
-LOW, HIGH = "4386/0100", "4386/1000"
-
-
+pytestmark = pytest.mark.usefixtures("without_pictures")
 HERE, OTHER = "0123456789" * 4, "abcdef0123" * 4
 
 
@@ -50,7 +48,6 @@ def test_rows_of_the_code_that_draws_call_for_no_warning(tmp_path: Path) -> None
     assert said(tmp_path, row(LOW, "a", commit=HERE, clean=True), row(LOW, "b", commit=HERE)) == []
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_rows_of_different_code_in_one_table_are_said_first(tmp_path: Path) -> None:
     rows = [row(LOW, "a", commit=HERE, clean=True), row(HIGH, "a", commit=OTHER, clean=False), row(LOW, "b")]
     mixed, unclean, older = said(tmp_path, *rows)
@@ -73,7 +70,6 @@ def test_rows_of_older_code_and_of_an_unknown_commit_are_said(tmp_path: Path) ->
     assert installed == older
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_different_code_of_one_solver_is_said(tmp_path: Path) -> None:
     rows = [row(LOW, "a", commit=HERE, solver_code="one"), row(HIGH, "a", commit=HERE, solver_code="two")]
     rows += [row(LOW, "b", commit=HERE, solver_code="three")]
@@ -90,11 +86,17 @@ def test_rows_of_two_problems_of_one_name_are_said(tmp_path: Path) -> None:
     assert doubt.startswith(f"Rows of {LOW} are of several problems of that name")
 
 
-@pytest.mark.usefixtures("without_pictures")
 def test_a_report_of_the_same_code_is_the_same_bytes(tmp_path: Path) -> None:
     directory = write_rows(tmp_path, [row(LOW, "a", commit=OTHER), row(HIGH, "a", commit=OTHER)])
     first = write(directory).read_bytes()
     assert write(directory).read_bytes() == first
+
+
+def test_several_versions_and_other_threads_than_those_asked_for_are_said(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", solver_version="1.0"), row(HIGH, "a", solver_version="1.1", threads=1)]
+    _, versions, threads = said(tmp_path, *rows)
+    assert versions == "a was run in several versions: 1.0 and 1.1."
+    assert threads.startswith("In 1 row (a) the number of threads in effect was not the requested one")
 
 
 # What is missing.

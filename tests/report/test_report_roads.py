@@ -96,11 +96,6 @@ def test_matrices_cost_what_they_took_on_the_machine_of_a_row(tmp_path: Path) ->
     assert found.set_index("machine")["K_s"].to_dict() == {"Made-up CPU, 2 cores": 8.5, "Slow CPU": 85.0}
 
 
-def test_a_run_without_an_answer_has_no_seconds_of_solving(tmp_path: Path) -> None:
-    found = lines(tmp_path, [sparse(), dense() | no_answer("time_limit")])
-    assert pd.isna(found.loc["newton (dual)", "solving_s"])
-
-
 def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
     section = from_scene(built(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
     assert len(section.blocks) == 1

@@ -51,11 +51,6 @@ def test_what_became_worse_from_version_to_version(tmp_path: Path) -> None:
     assert not any("several versions" in warning for warning in warnings(read(tmp_path)))
 
 
-def test_a_candidate_for_release_comes_before_the_release(tmp_path: Path) -> None:
-    _, table = told(tmp_path, [of("1.0"), of("1.0rc1"), of("0.9")]).blocks
-    assert [line[2] for line in shown(table)[1:]] == ["0.9", "1.0rc1", "1.0"]
-
-
 @pytest.mark.parametrize(("seconds", "said"), [(1.05, "–"), (1.2, "worse: 1.20 times as long")])
 def test_a_slowdown_counts_beyond_the_spread(tmp_path: Path, seconds: float, said: str) -> None:
     rows = [of(v, repeat=k, solve_s=s) for v, s in (("1", 1.0), ("2", seconds)) for k in range(3)]

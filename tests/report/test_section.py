@@ -1,7 +1,6 @@
 """The section through the largest gap, the view of the parts around it, and the sheet."""
 
 import re
-from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from report.document.numbers import (
     digits_beside,
     error_beside,
     extent,
-    no_less,
+    nearest,
     position,
     proven_to,
     raised,
@@ -76,19 +75,10 @@ def test_both_lines_go_through_the_largest_gap(worst: int) -> None:
         np.testing.assert_allclose(second.get_ydata() - first.get_ydata(), along(arrays["gap_after"]))
         np.testing.assert_allclose(was.get_ydata() - of_second.get_ydata(), along(arrays["gap_before"]))
         assert (second.get_ydata() - first.get_ydata()).max() == 2.0
+    assert figure.axes[1].get_title() == f"along y at x = {coordinate(place[0])} mm"
     (legend,) = figure.legends
     names = [text.get_text() for text in legend.get_texts()]
     assert names == [f"{name}, after" for name in PAIRS[worst // 21]["pair"]] + ["gap left", "before"]
-
-
-def test_the_lines_of_a_section_are_told_to_a_hundredth_of_a_millimetre() -> None:
-    record, arrays = answer(13)
-    arrays["contact_nodes"] = arrays["contact_nodes"] + np.array([1070.934, 0.0])
-    figure = section_figure(record, arrays)
-    assert figure is not None
-    place = coordinate(arrays["contact_nodes"][13, 0])
-    assert place.endswith(".93")
-    assert figure.axes[1].get_title() == f"along y at x = {place} mm"
 
 
 def test_scattered_contacts_have_no_section() -> None:
@@ -125,13 +115,25 @@ def test_what_has_no_area_is_not_drawn() -> None:
     assert deformed_figure({"m": 0, "pairs": []}, {}) is None
 
 
+@pytest.fixture
+def pages(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The pages to file that are made."""
+    made: list[Any] = []
+    begin = sheet._Page.__init__
+
+    def kept(page: Any) -> None:
+        begin(page)
+        made.append(page)
+
+    monkeypatch.setattr(sheet._Page, "__init__", kept)
+    return made
+
+
 @pytest.mark.parametrize("count", [0, 1, 24, 400])
 def test_the_sheet_is_one_page_that_prints_on_a4_and_letter(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+    tmp_path: Path, pages: list[Any], count: int
 ) -> None:
     """Nothing is cut, no text covers another, and each fastener is on it or said to be in a file."""
-    pages: list[Any] = []
-    monkeypatch.setattr(sheet._Page, "__init__", keeping(pages, sheet._Page.__init__))
     record, arrays = answer(8)
     figure = section_figure(record, arrays)
     assert figure is not None
@@ -190,9 +192,7 @@ def test_a_table_with_many_columns_is_no_wider_than_the_page() -> None:
     assert not any(one.overlaps(other) for one, other in combinations(boxes[1:], 2))
 
 
-def test_many_input_files_leave_room_for_the_origin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pages: list[Any] = []
-    monkeypatch.setattr(sheet._Page, "__init__", keeping(pages, sheet._Page.__init__))
+def test_many_input_files_leave_room_for_the_origin(tmp_path: Path, pages: list[Any]) -> None:
     inputs = {f"scan-{k}.csv": "0123456789abcdef" * 4 for k in range(1000)}
     content = sheet.Sheet("A joint", "", "No limit.", [], origin({"scene": "here"}), inputs)
     write_sheet(tmp_path / "sheet.pdf", content)
@@ -200,16 +200,6 @@ def test_many_input_files_leave_room_for_the_origin(tmp_path: Path, monkeypatch:
     texts = page.figure.texts
     assert "and 976 more. Scene: here" in " ".join(text.get_text() for text in texts)
     assert min(text.get_position()[1] for text in texts) > 0
-
-
-def keeping(pages: list[Any], begin: Callable[[Any], None]) -> Callable[[Any], None]:
-    """The constructor of a page, which is put into the list."""
-
-    def made(page: Any) -> None:
-        begin(page)
-        pages.append(page)
-
-    return made
 
 
 def test_places_are_rounded_by_the_size_of_the_part_and_a_gap_of_rounding_is_zero() -> None:
@@ -221,58 +211,39 @@ def test_places_are_rounded_by_the_size_of_the_part_and_a_gap_of_rounding_is_zer
     assert extent(np.array([-1.1e-6, 0.73])) == "-1.10e-6 … 0.730"
 
 
-@pytest.mark.parametrize(
-    ("bound", "digits", "said"),
-    [
-        (3.21e-16, 2, "3.3e-16"),
-        (3.2e-16, 2, "3.2e-16"),
-        (9.91e-17, 2, "1.0e-16"),
-        (1.01e-3, 1, "2e-03"),
-        (4.0011, 4, "4.002e+00"),
-        (0.0, 2, "0.0e+00"),
-        (np.inf, 2, "inf"),
-    ],
-)
-def test_a_bound_is_printed_no_less_than_it_is(bound: float, digits: int, said: str) -> None:
-    assert upwards(bound, digits) == said
-
-
 def test_no_bound_is_rounded_down_or_far() -> None:
     for bound in 10 ** np.random.default_rng(0).uniform(-20, 4, 300):
         for digits in range(1, 5):
             for said in (upwards(bound, digits), significant(raised(bound, digits), digits)):
                 assert bound <= float(said) <= bound * (1 + 1.001 * 10.0 ** (1 - digits))
+    said = [upwards(bound) for bound in (3.21e-16, 3.2e-16, 9.91e-17, 0.0, np.inf)]
+    assert said == ["3.3e-16", "3.2e-16", "1.0e-16", "0.0e+00", "inf"]
     assert exactness(1.241e-3) == "The calculation is exact to 0.0013 mm for this model."
     assert (raised(None), raised(np.inf)) == (None, None)
 
 
-def test_a_value_is_shown_on_its_side_of_a_limit() -> None:
-    said = [beside(0.05)(value) for value in (0.0512, 0.05004, 0.05, 0.04999)]
-    assert said == ["0.0512", "0.05004", "0.0500", "0.0500"]
-    assert [beside(0.05)(value) for value in (np.inf, None, np.nan)] == ["inf", "–", "–"]
-    said = [no_less(0.05)(value) for value in (0.05121, 0.04991, 0.04999, 0.05, 0.050001, np.inf, None)]
-    assert said == ["0.0513", "0.0500", "0.0500", "0.0500", "0.0501", "inf", "–"]
+@pytest.mark.parametrize(
+    ("rounded", "values", "said"),
+    [
+        (nearest, (0.0512, 0.05004, 0.05, 0.04999), ["0.0512", "0.05004", "0.0500", "0.0500"]),
+        (raised, (0.05121, 0.04991, 0.05, 0.050001), ["0.0513", "0.0500", "0.0500", "0.0501"]),
+    ],
+)
+def test_a_value_is_shown_on_its_side_of_a_limit(rounded: Any, values: Any, said: list[str]) -> None:
+    shown = [beside(0.05, rounded)(value) for value in (*values, np.inf, None, np.nan)]
+    assert shown == [*said, "inf", "–", "–"]
+
+
+def test_an_error_is_shown_on_its_side_of_a_limit() -> None:
     errors = [error_beside(1e-7, value) for value in (2e-7, 1.000004e-7, 1e-7, 3.21e-12)]
     assert errors == ["2.000e-07", "1.000004e-07", "1.000e-07", "3.210e-12"]
     assert error_beside(1.235e-7, 1.2351e-7) == "1.2351e-07"  # three digits are on its side, four are not
-
-
-def test_more_digits_are_on_the_side_of_a_limit_too() -> None:
-    """Three digits round 0.1238564 away from the limit, six to it."""
     assert [digits_beside(0.123856, 0.1238564, least) for least in (3, 6)] == [3, 7]
 
 
-@pytest.mark.parametrize(
-    ("error", "said"),
-    [
-        (3.21e-9, "proven to 3.3e-09 N"),
-        (0.0, "proven to 0.0e+00 N"),
-        (np.inf, "not proven"),
-        (None, "not proven"),
-    ],
-)
-def test_what_has_no_finite_error_is_not_proven(error: float | None, said: str) -> None:
-    assert proven_to(error, "N") == said
+def test_what_has_no_finite_error_is_not_proven() -> None:
+    said = [proven_to(error, "N") for error in (3.21e-9, 0.0, np.inf, None)]
+    assert said == ["proven to 3.3e-09 N", "proven to 0.0e+00 N", "not proven", "not proven"]
 
 
 def test_the_largest_gap_is_zero_where_it_is_rounding() -> None:

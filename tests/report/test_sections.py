@@ -11,7 +11,7 @@ from urllib.parse import parse_qs
 import pandas as pd
 import pytest
 from matplotlib.image import imread
-from synthetic_results import everything, no_answer, results, row, sweep, table, write_rows
+from synthetic_results import HIGH, LOW, everything, no_answer, results, row, sweep, table, write_rows
 
 from harness.results.schema import OWNERS
 from report.document.blocks import WIDEST, Figure, Section, Table, number, word
@@ -20,7 +20,6 @@ from report.results.reader import read
 from report.sections import (
     SECTIONS,
     accuracy,
-    all_measurements,
     random_scenes,
     series_throughput,
     speed,
@@ -30,9 +29,11 @@ from report.sections import (
 from report.writers.sections_writer import written
 from report.writers.suite_report import contents, write
 
-LOW, HIGH = "4386/0100", "4386/1000"
 SWEEP = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
-FORMS = {form: row(LOW, "newton", form) for form in ("dual", "primal", "sparse")}
+DUAL, PRIMAL, SPARSE = (row(LOW, "newton", form) for form in ("dual", "primal", "sparse"))
+#: Rows without both dense and sparse forms; a case of a series does not count, nor a form that is not taken.
+WITHOUT_BOTH = [[DUAL, PRIMAL], [SPARSE], [DUAL, SPARSE | {"case": 3}]]
+WITHOUT_BOTH += [[DUAL, SPARSE | {"status": "unsupported"}]]
 COUNTED = row(LOW, "newton", details={"products": 15})
 
 
@@ -49,29 +50,13 @@ def resolved(page: str) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "section", [of for _, of in SECTIONS], ids=lambda of: f"{of.__module__}.{of.__name__}"
-)
-def test_no_section_is_made_of_nothing(tmp_path: Path, section: Any) -> None:
-    assert section(results(tmp_path, [])) is None
-
-
-@pytest.mark.parametrize(
     ("section", "rows"),
     [
         *((of, SWEEP) for of in (accuracy.costs, accuracy.tolerances)),
         (speed.machine, [row(LOW, "newton")]),  # without benchmarks
         (summary.advice, [row(LOW, "a"), row(HIGH, "a")]),  # one method alone
         (speed.methods, [COUNTED, row(LOW, "piqp")]),  # one that counts is no comparison
-        (time_to_solution.section, [FORMS["dual"], FORMS["primal"]]),  # it takes dense and sparse forms,
-        (time_to_solution.section, [FORMS["sparse"]]),
-        (
-            time_to_solution.section,
-            [FORMS["dual"], FORMS["sparse"] | {"case": 3}],
-        ),  # no case of a series, which has
-        (
-            time_to_solution.section,
-            [FORMS["dual"], FORMS["sparse"] | {"status": "unsupported"}],
-        ),  # paid nothing
+        *((time_to_solution.section, rows) for rows in WITHOUT_BOTH),
     ],
 )
 def test_without_its_rows_there_is_no_section(tmp_path: Path, section: Any, rows: list[Any]) -> None:
@@ -144,7 +129,8 @@ def test_a_whole_report_has_every_section_its_pictures_and_links_that_lead_somew
     lines = map(json.loads, (folder / "measurements.jsonl").read_text("utf-8").splitlines())
     write_rows(folder, [line | {"key": f"{line['scene']} no={k}"} for k, line in enumerate([*lines])])
     page, whole = write(folder).read_text("utf-8"), read(folder)
-    cells, made = whole.cells, [of(whole.about(about)) for about, of in SECTIONS]
+    parts = [(of, whole.about(about)) for about, of in SECTIONS]
+    made = [of(part) for of, part in parts if len(part.rows)]
     assert re.findall("^## (.*)", page, re.M) == [section.title for section in made if section]
     for name in re.findall(r"!\[.*?\]\((.*?)\)", page):
         assert imread(folder / "report" / name)[..., :3].std() > 0.05, f"{name} is blank"
@@ -156,16 +142,11 @@ def test_a_whole_report_has_every_section_its_pictures_and_links_that_lead_somew
     links = re.findall(r"\]\(#([^)]+)\)", page)
     assert {"summary", "machine-and-method"} <= set(links) <= resolved(page)
     rows = [parse_qs(query)["row"][0] for query in re.findall(r"\]\(index\.html#([^)]+)\)", page)]
-    assert sorted(rows) == sorted(cells["key"])
+    assert sorted(rows) == sorted(whole.cells["key"])
     assert page.index("Contents: ") < page.index("## Summary")
     rules = re.findall(r"^\|[:|-]+\|$", page, re.MULTILINE)
     assert len(rules) > 5
     assert max(rule.count("|") - 1 for rule in rules) <= WIDEST
-
-
-def test_one_active_contact_is_no_plural(tmp_path: Path) -> None:
-    shown = table(all_measurements.section(results(tmp_path, [row("4386/0001")])))
-    assert "1 active contact (" in shown.caption
 
 
 def test_equal_titles_lead_to_a_heading_each() -> None:

@@ -14,7 +14,7 @@ from report.document.blocks import Figure, records
 from report.document.numbers import significant
 from report.results.series_results import QUANTILES, convergence, exceedance, quantile_maps, read
 from report.writers import place_report
-from report.writers.series_report import _convergence, _maps, _sheet, _statistics, _swept, write
+from report.writers.series_report import _maps, _sheet, _statistics, _swept, write
 from report.writers.sheet import Sheet
 
 
@@ -72,15 +72,6 @@ def test_the_report_and_its_files(swept: bool, tmp_path: Path) -> None:
     np.testing.assert_allclose(maps["q0.95_mm"], np.quantile(gaps, 0.95, axis=0))
     assert "239 within, 1 no answer" in text.replace("1 no answer, 239 within", "239 within, 1 no answer")
     assert "76.9 cases per second of work" in text
-
-
-def test_quantiles_of_few_cases_can_be_seen(tmp_path: Path) -> None:
-    """Each curve is little more than a point there."""
-    made(tmp_path)
-    series = read(tmp_path)
-    figure = _convergence(replace(series, cases=series.cases[:5]))
-    (axes,) = figure.drawing.axes
-    assert {line.get_marker() for line in axes.lines} == {"."}
 
 
 def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:

@@ -100,14 +100,8 @@ def test_proportions_are_true() -> None:
 def test_nodes_on_a_line_have_a_picture() -> None:
     """A user's own matrices may have such coordinates."""
     nodes = np.column_stack([np.linspace(0.0, 9.0, 4), np.zeros(4)])
-    part = {
-        "name": "rod",
-        "start": 0,
-        "stop": 4,
-        "outline": [0.0, 9.0, 0.0, 0.0],
-        "clamped": [],
-        "supports": [],
-    }
+    part = {"name": "rod", "start": 0, "stop": 4, "outline": [0.0, 9.0, 0.0, 0.0]}
+    part |= {"clamped": [], "supports": []}
     record = {"m": 0, "parts": [part], "pairs": [], "marks": {}}
     arrays = {"x": np.arange(4.0), "lam": np.empty(0), "nodes": nodes}
     (figure,) = answer_figures(record, arrays).values()

@@ -47,6 +47,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, Path]:
     return cells, write(folder / "index.html", "Made up", run_data(found), folder)
 
 
+def page_with(folder: Path, rows: list[dict[str, Any]], directory: Path | None = None) -> Path:
+    """The page of these rows. directory : of the rows, as the page's commands name it."""
+    return write(folder / "index.html", "", run_data(results_of(folder, rows)), directory)
+
+
 def opened(driver: Any, page: Path, address: str = "") -> None:
     """Load a page anew, and wait for it: Chromium's driver may return before its scripts have run.
 
@@ -112,7 +117,7 @@ def test_no_view_has_an_error(chromium: Any, made: tuple[pd.DataFrame, Path], tm
     hostile, answer, series, old, new, empty = folders
     found = read(results(hostile, HOSTILE))
     pages = [made[1], write(hostile / "index.html", str(found.suite["title"]), run_data(found), hostile)]
-    pages.append(write(empty / "index.html", "", run_data(results_of(empty, [])), empty))
+    pages.append(page_with(empty, [], empty))
     write_solution(solution(answer, HOSTILE))
     made_series(series)
     write_series(series)
@@ -163,7 +168,7 @@ def test_the_limit_of_the_rows_is_that_of_the_page_with_all_its_digits(chromium:
     for limit, error, verdict in ((1.24e-7, 1.22e-7, "within"), (1.26e-7, 1.28e-7, "outside")):
         judged_at = {"limit_mm": limit, "limit_asked_mm": limit}
         rows = [row(displacement_error_mm=error, verdict=verdict, **judged_at)]
-        opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))))
+        opened(chromium, page_with(tmp_path, rows))
         assert chromium.execute_script("return filtered().map(cell => cell.judged)") == [verdict]
         before = chromium.execute_script("return at('limit')")
         chosen(chromium, "limit", "12")
@@ -173,7 +178,7 @@ def test_the_limit_of_the_rows_is_that_of_the_page_with_all_its_digits(chromium:
 
 
 def test_bounds_are_rounded_upwards(chromium: Any, tmp_path: Path) -> None:
-    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, [row()]))))
+    opened(chromium, page_with(tmp_path, [row()]))
     script = "return [3.201e-16, 3.2e-16, 9.999e-9, null].map(bound => number(raised(bound)))"
     assert chromium.execute_script(script) == ["3.21e-16", "3.2e-16", "1e-8", "–"]
 
@@ -181,7 +186,7 @@ def test_bounds_are_rounded_upwards(chromium: Any, tmp_path: Path) -> None:
 def test_an_answer_without_seconds_is_within_the_limit_all_the_same(chromium: Any, tmp_path: Path) -> None:
     rows = [row(setup_s=0.0, solve_s=0.0, form_s=0.0), row(solver="gi")]
     rows.append(row(solver="gi", scene="4386/1074", verdict="outside", displacement_error_mm=1e-6))
-    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))))
+    opened(chromium, page_with(tmp_path, rows))
     script = "return ranking(filtered()).map(line => [line.name, line.within, line.scenes, line.rank])"
     assert chromium.execute_script(script) == [["ipm (dual)", 1, 1, 1], ["gi (dual)", 1, 2, 2]]
 
@@ -242,7 +247,7 @@ def test_enter_on_a_cell_opens_its_row_with_the_command(chromium: Any, tmp_path:
     key = "4386/0052 ipm dual tol=1e-09 threads=2 repeat=0"
     odd = "4386/0052 it's dual tol=1e-09 threads=2 repeat=0"
     rows = [row(key=key), row(solver="it's", key=odd, solve_s=9.0)]
-    page = write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows)), Path("results/made"))
+    page = page_with(tmp_path, rows, Path("results/made"))
     opened(chromium, page)
     again = "python -m harness run results/made --key '{}' --out results/again"
     for place, name in enumerate((key, odd.replace("'", "'\\''"))):
@@ -250,18 +255,15 @@ def test_enter_on_a_cell_opens_its_row_with_the_command(chromium: Any, tmp_path:
             f"{SEEN}[{place}].focus(); document.activeElement.dispatchEvent("
             "new KeyboardEvent('keydown', {key: 'Enter', bubbles: true}))"
         )
-        assert chromium.execute_script("return dialog.querySelector('code').textContent") == again.format(
-            name
-        )
+        command = chromium.execute_script("return dialog.querySelector('code').textContent")
+        assert command == again.format(name)
         chromium.execute_script("dialog.close()")
 
 
 def test_a_marker_tells_of_its_measurement_and_opens_its_row(chromium: Any, tmp_path: Path) -> None:
     """What the solver's name has of markup is text in both."""
     rows = [row(solver="<b>bold</b>", key="4386/0052 bold")]
-    opened(
-        chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))), "view=precision"
-    )
+    opened(chromium, page_with(tmp_path, rows), "view=precision")
     click, tooltip = pointed(chromium, "cells", "reached_mm", "seconds", 0)
     assert "<b>bold</b> (dual) on 4386/0052" in tooltip
     click.perform()
@@ -288,7 +290,7 @@ def test_a_map_of_a_series_has_its_worst_case_and_curves(chromium: Any, tmp_path
 def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:
     keys = ["4386/0052 gi tol=1e-9", "4386/0052 ipm tol=1e-9"]
     rows = [row(solver=key.split()[1], key=key) for key in keys]
-    page = write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows)))
+    page = page_with(tmp_path, rows)
     opened(chromium, page, urlencode({"row": keys[1]}))
     assert keys[1] in chromium.execute_script("return dialog.open ? dialog.textContent : ''")
     chromium.execute_script("dialog.close()")
@@ -300,7 +302,7 @@ def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:
 def test_a_row_is_of_the_machine_that_is_named_or_chosen(chromium: Any, tmp_path: Path) -> None:
     names, key = ("One CPU", "Other CPU"), "4386/0052 ipm"
     rows = [row(key=key, machine=name, solve_s=1.0 + k) for k, name in enumerate(names)]
-    page = write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows)))
+    page = page_with(tmp_path, rows)
     shown = "return dialog.open ? [...dialog.querySelectorAll('td')].map(td => td.textContent) : []"
     for name, other in (names, names[::-1]):
         opened(chromium, page, urlencode({"row": key, "machine": name}))
@@ -316,7 +318,7 @@ def test_a_ladder_says_where_a_solver_breaks(chromium: Any, tmp_path: Path) -> N
     rungs = {"1e+00": "within", "1e-02": "no_answer", "1e-04": "outside"}
     rows = [row(verdict=verdict) | {"scene": f"hard/supports/{name}"} for name, verdict in rungs.items()]
     rows.append(row() | {"scene": "hard/refinement/08"})
-    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))), "view=solver")
+    opened(chromium, page_with(tmp_path, rows), "view=solver")
     text = chromium.execute_script("return document.getElementById('breaks').textContent")
     assert text == "Breaks at supports/1e-02."
 
@@ -328,6 +330,6 @@ def test_all_rungs_are_in_one_view(chromium: Any, tmp_path: Path) -> None:
         for rung in range(27)
         for solver in ("ipm", "gi")
     ]
-    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows))))
+    opened(chromium, page_with(tmp_path, rows))
     assert chromium.execute_script(f"return {SEEN}.length") == len(rows)
     assert chromium.execute_script("return box.scrollWidth <= box.clientWidth")
