@@ -175,8 +175,7 @@ class Measuring:
                 _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
                 made.add(m.form)
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            key = problem.scene_key if problem.scene.sources else ""
-            task = Task(batch, self.solvers[m.solver, m.entry.label], key)
+            task = Task(batch, self.solvers[m.solver, m.entry.label], problem.scene_key)
             self.running[m.key] = m
             yield (task, problem), task
 

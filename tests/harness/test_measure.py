@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from problems.errors import InputError
 from problems.scene_files import read_scene
+from solvers.base import Form
 
 pytestmark = pytest.mark.slow
 starts = pytest.mark.starts
@@ -193,16 +195,20 @@ def test_an_orphan_that_is_in_no_list_yet_is_killed_too(monkeypatch: pytest.Monk
     assert killed == [11, 12]
 
 
-def measurement(folder: Path) -> Measurement:
-    entry = SolverEntry(name="gi")
-    suite = Suite(name="s", scenes=["tiny"], solver=[entry])
+def measurement(folder: Path, solver: str = "gi", plugin: str | None = None) -> Measurement:
+    entry = SolverEntry(name=solver)
+    suite = Suite(name="s", scenes=["tiny"], plugin=plugin, solver=[entry])
     asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
     return Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
 
 
+def task_of(m: Measurement, form: Form = "dual", version: str = "1") -> Task:
+    return Task([m], Description([form], version, "code"), read_scene(m.source).key)
+
+
 def test_another_scene_than_that_of_the_reference_is_refused(folder: Path) -> None:
     """It has changed meanwhile, or is older on a worker: right answers would be judged as wrong ones."""
-    task = Task([measurement(folder)], Description(["dual"], "1", "code"), "of another file")
+    task = replace(task_of(measurement(folder), "primal"), scene_key="of another file")
     with pytest.raises(InputError, match="it has changed since, or is another on this worker"):
         run_task(task, folder)
     with pytest.raises(InputError, match="the file that the run has read"):
@@ -217,35 +223,29 @@ def test_a_scene_that_changes_before_its_process_reads_it_is_refused(
         return [{"status": "solved"}]
 
     tiny_joint.write_problem(tmp_path / "tiny.npz")
-    m = measurement(tmp_path)
+    task = task_of(measurement(tmp_path))
     monkeypatch.setattr("harness.measurement.task.measure", changing)
     with pytest.raises(InputError, match="it has changed since"):
-        run_task(Task([m], Description(["dual"], "1", "code"), read_scene(m.source).key), tmp_path)
+        run_task(task, tmp_path)
 
 
-def test_a_scene_without_files_is_not_made_again_to_be_compared(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scene_without_files_is_not_made_again_to_be_compared(folder: Path) -> None:
     """The key of a rung takes all its matrices."""
-    monkeypatch.setattr("harness.measurement.task.read_scene", None)  # not called
-    task = Task([measurement(folder)], Description(["primal"], "1", "code"))
+    rung = replace(measurement(folder), source="hard/pivoting/fathi-008")
+    task = replace(task_of(rung, "primal"), scene_key="not compared")
     assert run_task(task, folder).reports[0]["status"] == "unsupported"
 
 
 def test_another_plug_in_than_the_one_described_is_refused(folder: Path) -> None:
     """It was edited meanwhile, or is older on a worker: its row would have the version of the other."""
-    entry = SolverEntry(name="exact")
-    suite = Suite(name="s", scenes=["tiny"], plugin=str(folder / "exact.py"), solver=[entry])
-    asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
-    m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
-    task = Task([m], Description(["dual"], "sha256:of another", "code"))
+    task = task_of(measurement(folder, "exact", str(folder / "exact.py")), version="sha256:of another")
     with pytest.raises(InputError, match=r"exact\.py: version = 'sha256:\w+': sha256:of another, as at"):
         run_task(task, folder)
 
 
 def test_another_version_of_a_solver_than_the_one_described_is_refused(folder: Path) -> None:
     """A worker has another one installed: its row would have the version of the driver's."""
-    task = Task([measurement(folder)], Description(["dual"], "0.0.1", "code"))
+    task = task_of(measurement(folder), version="0.0.1")
     with pytest.raises(InputError, match=r"solver gi: version = '.+': 0\.0\.1, as at the beginning"):
         run_task(task, folder)
 

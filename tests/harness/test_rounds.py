@@ -242,7 +242,7 @@ def test_the_last_iterate_of_what_stops_by_itself_is_judged(suite: Suite, tmp_pa
     (m,) = expand(late)
     answers = tmp_path / "answers"
     answers.mkdir()
-    task = Task([replace(m, time_limit_s=0.01)], Description(["dual"], "1", "code"))
+    task = Task([replace(m, time_limit_s=0.01)], Description(["dual"], "1", "code"), "")
     (report,) = measured_here(task, answers).reports
     assert (report["status"], report["iterations"]) == ("time_limit", 7)
     assert report["message"] == f"stopped by itself after {OWN_LIMIT * 0.01:g} s, with its last iterate"
