@@ -98,36 +98,23 @@ def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
 
 
 def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
+    """Torn lines are left out, also of the files of which `report` says that `run` does it."""
     lines = (copy / records.MEASUREMENTS).read_bytes().splitlines(keepends=True)
     (copy / records.MEASUREMENTS).write_bytes(lines[0] + lines[1] + lines[2] + lines[3][:50])
+    others = ("problems.jsonl", records.OUTDATED)
+    for name in others:
+        with (copy / name).open("ab") as file:
+            file.write(b'{"torn')
     code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
     assert code == 0
-    assert "the last line was cut off" in text
+    for name in (records.MEASUREMENTS, *others):
+        assert f"{name}: the last line was cut off" in text.replace("\n", "")
+    assert [len(records.read(copy / name)) for name in others] == [1, 0]
     assert "4 measurements, 3 of them already" in text
     again = (copy / records.MEASUREMENTS).read_bytes().splitlines(keepends=True)
     assert again[:3] == lines[:3]
     assert len(again) == 4
     assert json.loads(again[3])["key"] == json.loads(lines[3])["key"]
-
-
-@pytest.mark.parametrize("name", ["problems.jsonl", records.OUTDATED])
-def test_a_torn_line_of_another_file_is_left_out_too(copy: Path, folder: Path, name: str) -> None:
-    """`report` refuses it, and says that `run` into the same directory removes it."""
-    before = records.read(copy / name)
-    with (copy / name).open("ab") as file:
-        file.write(b'{"torn')
-    code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
-    assert code == 0
-    assert f"{name}: the last line was cut off" in text.replace("\n", "")
-    assert records.read(copy / name) == before
-
-
-@pytest.mark.parametrize("name", ["verdict", "tolerance", "repeat"])
-def test_a_row_that_lacks_what_a_run_reads_is_named(copy: Path, folder: Path, name: str) -> None:
-    rows = rows_of(copy)
-    del rows[1][name]
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    assert f"line 2: {name}" in wrong_usage("run", folder / "small.toml", "--out", copy)
 
 
 def test_scenes_that_cannot_be_read_end_a_run_before_it_measures(
