@@ -3,6 +3,7 @@
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 import tiny_joint
@@ -42,6 +43,12 @@ def plan_of(tmp_path: Path, **keys: object) -> list[Measurement]:
     return expand(read_suite(str(tiny_joint.write_suite(tmp_path, TWO, **keys))))
 
 
+def dual_suite(tmp_path: Path, *solvers: dict[str, Any], **keys: Any) -> Suite:
+    """Of solvers in the dual form on one scene."""
+    entries = [{"forms": ["dual"]} | solver for solver in solvers]
+    return suite_from({"scenes": ["4386/0107"], "solver": entries} | keys, tmp_path / "suite.toml")
+
+
 @pytest.mark.parametrize("name", suite_names())
 def test_the_suites_of_the_package_can_be_planned(name: str) -> None:
     assert expand(read_suite(name))
@@ -73,32 +80,28 @@ def test_repeats_are_interleaved_and_shuffled_the_same_way_each_time(tmp_path: P
 
 
 def test_a_shuffled_round_keeps_the_order_of_the_tolerances(tmp_path: Path) -> None:
-    tolerances = [1e-2, 1e-5, 1e-3, 1e-8]
-    solvers = [{"name": name, "forms": ["dual"], "tolerances": tolerances} for name in ("ipm", "gi", "piqp")]
-    data = {"scenes": ["4386/0107"], "repeats": 3, "solver": solvers}
-    plan = expand(suite_from(data, tmp_path / "suite.toml"))
+    tolerances, solvers = [1e-2, 1e-5, 1e-3, 1e-8], ["ipm", "gi", "piqp"]
+    entries = ({"name": name} for name in solvers)
+    plan = expand(dual_suite(tmp_path, *entries, tolerances=tolerances, repeats=3))
     for repeat in range(3):
         names = [m.solver for m in plan if m.repeat == repeat]
-        in_order = sorted(names, key=["ipm", "gi", "piqp"].index)
+        in_order = sorted(names, key=solvers.index)
         assert (names == in_order) is (repeat == 0)  # the first round is not shuffled
         for name in set(names):
             assert [m.tolerance for m in plan if (m.solver, m.repeat) == (name, repeat)] == tolerances
 
 
 def test_an_entry_may_have_repeats_of_its_own(tmp_path: Path) -> None:
-    own = {"name": "ipm", "forms": ["dual"], "tolerances": [1e-6], "repeats": 3}
-    rest = {"name": "ipm", "forms": ["dual"], "tolerances": [1e-2, 1e-6]}
-    data = {"scenes": ["4386/0107"], "solver": [rest, own]}
-    plan = expand(suite_from(data, tmp_path / "suite.toml"))
-    assert sorted((m.tolerance, m.repeat) for m in plan) == [(1e-6, 0), (1e-6, 1), (1e-6, 2), (1e-2, 0)]
-    once = overridden(suite_from(data, tmp_path / "suite.toml"), Overrides(repeats=1))
+    own = {"name": "ipm", "tolerances": [1e-6], "repeats": 3}
+    suite = dual_suite(tmp_path, {"name": "ipm", "tolerances": [1e-2, 1e-6]}, own)
+    planned = sorted((m.tolerance, m.repeat) for m in expand(suite))
+    assert planned == [(1e-6, 0), (1e-6, 1), (1e-6, 2), (1e-2, 0)]
+    once = overridden(suite, Overrides(repeats=1))
     assert {m.repeat for m in expand(once)} == {0}
 
 
 def test_an_entry_may_have_numbers_of_threads_of_its_own(tmp_path: Path) -> None:
-    own = {"name": "ipm", "forms": ["dual"], "threads": [2]}
-    data = {"scenes": ["4386/0107"], "threads": [1, 4], "solver": [{"name": "gi", "forms": ["dual"]}, own]}
-    suite = suite_from(data, tmp_path / "suite.toml")
+    suite = dual_suite(tmp_path, {"name": "gi"}, {"name": "ipm", "threads": [2]}, threads=[1, 4])
     assert [(m.solver, m.threads) for m in expand(suite)] == [("gi", 1), ("gi", 4), ("ipm", 2)]
     told = overridden(suite, Overrides(threads=(3,)))
     assert [(m.solver, m.threads) for m in expand(told)] == [("gi", 3), ("ipm", 3)]
@@ -148,9 +151,20 @@ def test_the_name_of_a_suite_is_that_of_a_folder(tmp_path: Path, name: str) -> N
     assert [fault.key for fault in refused.faults] == ["name"]
 
 
-def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> None:
-    text = '[[solver]]\nname = "gi"\n[[solver]]\nname = "gi"\noptions = {a = 1}\n'
-    with pytest.raises(InputError, match=r"solver\.1\.variant"):
+@pytest.mark.parametrize(
+    ("text", "refused"),
+    [
+        ('[[solver]]\nname = "gi"\n[[solver]]\nname = "gi"\noptions = {a = 1}\n', r"solver\.1\.variant"),
+        (
+            f'{TWO}with = ["piqp==0.6.2"]\n[[solver]]\nname = "piqp"\nvariant = "plain 0.6.2"\n',
+            "other `with` under this variant",
+        ),
+    ],
+)
+def test_one_name_and_variant_stands_for_one_set_of_options_and_versions(
+    tmp_path: Path, text: str, refused: str
+) -> None:
+    with pytest.raises(InputError, match=refused):
         read_suite(str(tiny_joint.write_suite(tmp_path, text)))
 
 
@@ -258,18 +272,18 @@ class TestOverrides:
             overridden(suite, Overrides(scenes=("nowhere",)))
 
 
-def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("scene", "own", "name"),
+    [("tiny.npz", "other/tiny.npz", "tiny"), ("4386/0107", "4386_0107.npz", "4386_0107")],
+)
+def test_two_scenes_whose_files_would_have_one_name_are_refused(
+    tmp_path: Path, scene: str, own: str, name: str
+) -> None:
     (tmp_path / "other").mkdir()
-    tiny_joint.write_problem(tmp_path / "other" / "tiny.npz")
-    with pytest.raises(InputError, match="another is called tiny too"):
-        plan_of(tmp_path, scenes=["tiny.npz", "other/tiny.npz"])
-
-
-def test_two_scenes_whose_files_would_have_one_name_are_refused(tmp_path: Path) -> None:
-    own = tiny_joint.write_problem(tmp_path / "4386_0107.npz")
-    with pytest.raises(InputError, match="another is called 4386_0107 too") as caught:
-        plan_of(tmp_path, scenes=["4386/0107", own.name])
-    assert [fault.value for fault in caught.value.faults] == [str(own)]
+    path = tiny_joint.write_problem(tmp_path / own)
+    with pytest.raises(InputError, match=f"another is called {name} too") as caught:
+        plan_of(tmp_path, scenes=[scene, own])
+    assert [fault.value for fault in caught.value.faults] == [str(path)]
 
 
 def test_files_are_as_distinct_as_the_rows_they_belong_to(tmp_path: Path) -> None:
@@ -279,16 +293,14 @@ def test_files_are_as_distinct_as_the_rows_they_belong_to(tmp_path: Path) -> Non
         tiny_joint.write_problem(tmp_path / scene)
     plan: list[Measurement] = []
     for changed in ({"variant": "eps<1"}, {"variant": "eps>1"}, {"options": {"k": 1}}, {"options": {"k": 2}}):
-        solver = {"name": "gi", "forms": ["dual"]} | changed
-        plan += expand(suite_from({"scenes": scenes, "solver": [solver]}, tmp_path / "suite.toml"))
+        plan += expand(dual_suite(tmp_path, {"name": "gi"} | changed, scenes=scenes))
     assert len({m.stem for m in plan}) == len({m.key for m in plan}) == 12
     assert all(re.fullmatch(r"[\w.+-]{1,200}", m.stem, re.ASCII) for m in plan)
 
 
 def test_load_cases_that_are_solved_at_once_in_two_ways_are_of_two_processes(tmp_path: Path) -> None:
-    ways = [{"name": "newton", "forms": ["dual"], "variant": "batched", "batched": k} for k in (2, 4)]
-    data = {"scenes": ["4386/0107"], "series": {"cases": 4}, "solver": ways}
-    plan = expand(suite_from(data, tmp_path / "suite.toml"))
+    ways = ({"name": "newton", "variant": "batched", "batched": k} for k in (2, 4))
+    plan = expand(dual_suite(tmp_path, *ways, series={"cases": 4}))
     assert len({m.stem for m in plan}) == len({m.key for m in plan}) == 8
     assert [[(m.entry.batched, m.case) for m in batch] for batch in batches(plan)] == [
         [(k, case) for case in range(4)] for k in (2, 4)
@@ -356,12 +368,6 @@ def test_only_true_and_false_are_truth_values(tmp_path: Path) -> None:
         InputError, match=r"(?s)threads\.0.*number.*trace.*boolean.*solver\.1\.gated.*boolean"
     ):
         read_suite(str(path))
-
-
-def test_versions_that_could_not_be_told_apart_are_refused(tmp_path: Path) -> None:
-    other = '[[solver]]\nname = "piqp"\nvariant = "plain 0.6.2"\n'
-    with pytest.raises(InputError, match="other `with` under this variant"):
-        read_suite(str(tiny_joint.write_suite(tmp_path, TWO + 'with = ["piqp==0.6.2"]\n' + other)))
 
 
 def test_a_scene_from_outside_is_for_every_entry() -> None:
