@@ -187,7 +187,7 @@ def test_a_row_of_a_round_is_measured_again_by_its_key(
     assert again["key"] == f"{row['key']} round={again['round']}"
 
 
-def test_a_row_that_is_no_longer_planned_is_not_kept(
+def test_rows_that_are_still_planned_are_kept_with_the_scenes_that_they_need(
     suite: Suite, release: Callable[..., list[Row]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     release("first")
@@ -195,11 +195,6 @@ def test_a_row_that_is_no_longer_planned_is_not_kept(
     monkeypatch.setattr(published, "read_suite", lambda name: smaller)
     published.begin("small", directory := published.STAGED / "second")
     assert {row["variant"] for row in rows_of(directory) if row["beside_round"]} == {"a"}
-
-
-def test_what_matrices_took_is_kept_beside_the_rows_that_need_it(release: Callable[..., list[Row]]) -> None:
-    release("first")
-    published.begin("small", directory := published.STAGED / "second")
     problems, kept = (folder / "problems.jsonl" for folder in (published.PUBLISHED / "small", directory))
     assert kept.read_text() == problems.read_text()
 
