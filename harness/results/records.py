@@ -32,8 +32,8 @@ OTHER = "name another directory with --out"
 
 
 def to_line(row: Row, indent: int | None = None) -> str:
-    """Strict JSON, one line unless it is indented: non-finite numbers become null, and lone surrogates, as in a
-    file name that is not UTF-8, their JSON escapes.
+    """Strict JSON, one line unless it is indented: non-finite numbers become null, and lone surrogates, as in
+    a file name that is not UTF-8, their JSON escapes.
     """
     text = json.dumps(_plain(row), ensure_ascii=False, allow_nan=False, indent=indent)
     return text.encode("utf-8", "backslashreplace").decode()
