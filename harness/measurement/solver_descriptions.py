@@ -189,9 +189,9 @@ def resumed(
 
     def is_old(row: Row) -> bool:
         m, scene_key = planned.get(row["key"]), scene_keys.get(row["scene"])
-        if scene_key and (row.get("scene_key") or scene_key) != scene_key:
+        if scene_key and row.get("scene_key") != scene_key:
             return True
-        return m is not None and outdated(row, m, solvers[m.solver, m.entry.label], scene_keys[m.scene])
+        return m is not None and outdated(row, m, solvers[m.solver, m.entry.label])
 
     valid: list[Row] = []
     old: list[Row] = []
@@ -206,14 +206,13 @@ def resumed(
     return valid
 
 
-def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
-    """Whether a row has to be measured again.
+def outdated(row: Row, m: Measurement, solver: Description) -> bool:
+    """Whether a row of a scene as it is has to be measured again.
 
-    It is of another scene, series, solver or accuracy, hit a limit that is wider now, or has the status
+    It is of another series, solver or accuracy, hit a limit that is wider now, or has the status
     `not_run` of older versions; or a search tried what is asked for now: reports keep one row of a search.
     """
     current = {
-        "scene_key": scene_key,
         "solver_version": solver.version,
         "solver_code": solver.code,
         "limit_asked_mm": m.suite.limit_mm,
