@@ -85,7 +85,7 @@ class Clock:
 @pytest.fixture
 def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Suite:
     """Its measurements are made in this process, and published by `release`."""
-    made = read_suite(str(tiny_joint.write_suite(tmp_path, SUITE)))
+    made = tiny_joint.suite(tmp_path, SUITE)
     monkeypatch.setattr(suite_run, "run_task", measured_here)
     monkeypatch.setattr(suite_run, "datetime", Clock(timedelta(minutes=1)))
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")

@@ -61,9 +61,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def finished(folder: Path) -> Path:
     """A directory with the rows of a run; tests take a `copy`."""
-    code, text = said_by(
-        run, read_suite(str(tiny_joint.write_suite(folder, TWO, yardstick=True))), folder / "finished"
-    )
+    code, text = said_by(run, tiny_joint.suite(folder, TWO, yardstick=True), folder / "finished")
     assert code == 0
     assert "4 measurements" in text
     return folder / "finished"

@@ -29,7 +29,6 @@ from harness.measurement import scheduler
 from harness.measurement.monitored_call import TRIM, environment
 from harness.measurement.scheduler import TASKS_PER_WORKER, done_as_completed, versions, workers
 from harness.measurement.suite_run import run as run_suite
-from harness.planning.suite import read_suite
 from harness.results import series_file
 from harness.results.comparison import Incomparable
 from harness.series.executors import on_workers, solve_on_worker
@@ -278,7 +277,7 @@ def test_a_measurement_that_kills_its_workers_is_left_and_said(cluster: Any, tmp
     their answers are brought here.
     """
     entries = '[[solver]]\nname = "newton"\n[[solver]]\nname = "exact"\n'
-    suite = read_suite(str(tiny_joint.write_suite(tmp_path, entries)))
+    suite = tiny_joint.suite(tmp_path, entries)
     killer = tiny_joint.EXACT.replace("L = sla", "import os; os.kill(os.getppid(), 9); L = sla")
     (tmp_path / "exact.py").write_text(killer)
     code, said = said_by(

@@ -40,7 +40,7 @@ time_limit_s = 3
 
 
 def plan_of(tmp_path: Path, **keys: object) -> list[Measurement]:
-    return expand(read_suite(str(tiny_joint.write_suite(tmp_path, TWO, **keys))))
+    return expand(tiny_joint.suite(tmp_path, TWO, **keys))
 
 
 def dual_suite(tmp_path: Path, *solvers: dict[str, Any], **keys: Any) -> Suite:
@@ -108,7 +108,7 @@ def test_an_entry_may_have_numbers_of_threads_of_its_own(tmp_path: Path) -> None
 
 
 def test_what_is_written_beside_the_rows_reads_back_the_same(tmp_path: Path) -> None:
-    suite = read_suite(str(tiny_joint.write_suite(tmp_path, TWO, title='a "quoted" title — ü')))
+    suite = tiny_joint.suite(tmp_path, TWO, title='a "quoted" title — ü')
     odd = {"description": "\x7f\n\\ \U0001f600", "time_limit_by_size_s": {12: 1e-9}}
     suite = suite.model_copy(update=odd)
     assert validated(tomllib.loads(to_toml(suite)), tmp_path / "suite.toml") == suite
@@ -147,7 +147,7 @@ def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["..", ".", "...", "", "a/b", "/tmp/a", "a\\b"])
 def test_the_name_of_a_suite_is_that_of_a_folder(tmp_path: Path, name: str) -> None:
     """`run` writes into results/NAME: with '..' it wrote into the current folder."""
-    refused = refusal_of(read_suite, str(tiny_joint.write_suite(tmp_path, name=name)))
+    refused = refusal_of(tiny_joint.suite, tmp_path, name=name)
     assert [fault.key for fault in refused.faults] == ["name"]
 
 
@@ -165,7 +165,7 @@ def test_one_name_and_variant_stands_for_one_set_of_options_and_versions(
     tmp_path: Path, text: str, refused: str
 ) -> None:
     with pytest.raises(InputError, match=refused):
-        read_suite(str(tiny_joint.write_suite(tmp_path, text)))
+        tiny_joint.suite(tmp_path, text)
 
 
 ENTRY = '[[solver]]\nname = "exact"\n'
@@ -203,7 +203,7 @@ def test_no_entry_decides_for_another_whether_a_row_is_gated_and_how_long_it_may
 def test_of_entries_that_an_option_brings_together_the_first_counts(tmp_path: Path) -> None:
     text = f"{ENTRY}{ENTRY}gated = false\ntolerances = [1e-3]\n"
     change = Overrides(forms=("dual",), tolerances=(1e-6,))
-    suite = overridden(read_suite(str(tiny_joint.write_suite(tmp_path, text))), change)
+    suite = overridden(tiny_joint.suite(tmp_path, text), change)
     assert [m.entry.gated for m in expand(suite)] == [True]
     (tmp_path / "written.toml").write_text(to_toml(suite))
     assert expand(read_written(tmp_path / "written.toml"))
@@ -217,9 +217,7 @@ def test_unknown_suite_names_the_known_ones() -> None:
 class TestOverrides:
     @pytest.fixture
     def suite(self, tmp_path: Path) -> Suite:
-        return read_suite(
-            str(tiny_joint.write_suite(tmp_path, TWO, scenes=["tiny.npz", "4386/0052", "6112/0120"]))
-        )
+        return tiny_joint.suite(tmp_path, TWO, scenes=["tiny.npz", "4386/0052", "6112/0120"])
 
     def test_scenes_sizes_and_solvers(self, suite: Suite) -> None:
         suite = suite.model_copy(update={"description": "Of the whole suite."})
@@ -312,9 +310,7 @@ def test_load_cases_that_are_solved_at_once_in_two_ways_are_of_two_processes(tmp
 
 
 def versions_asked(tmp_path: Path, *requirements: str, **more: tuple[str, ...]) -> list[tuple[str, str, str]]:
-    suite = overridden(
-        read_suite(str(tiny_joint.write_suite(tmp_path, TWO))), Overrides(requirements=requirements, **more)
-    )
+    suite = overridden(tiny_joint.suite(tmp_path, TWO), Overrides(requirements=requirements, **more))
     assert suite_from(tomllib.loads(to_toml(suite)), tmp_path / "small.toml") == suite
     return [(e.name, e.label, e.version) for e in suite.solver]
 
@@ -337,7 +333,7 @@ def test_each_version_is_an_entry_of_its_own(tmp_path: Path) -> None:
 
 def test_a_version_is_part_of_what_a_row_is_of(tmp_path: Path) -> None:
     text = TWO + 'with = ["piqp==0.6.2", "numpy==2.1.0"]\n'
-    plan = expand(read_suite(str(tiny_joint.write_suite(tmp_path, text))))
+    plan = expand(tiny_joint.suite(tmp_path, text))
     assert plan[-1].key == "tiny piqp primal plain 0.6.2 numpy==2.1.0 tol=1e-06 threads=1 repeat=0"
     assert plan[-1].entry.requirements == ["piqp==0.6.2", "numpy==2.1.0"]
     (entry,) = with_key(read_suite(str(tmp_path / "small.toml")), plan[-1].key).solver
@@ -347,7 +343,7 @@ def test_a_version_is_part_of_what_a_row_is_of(tmp_path: Path) -> None:
 def test_the_name_of_a_plug_in_may_have_blanks_and_dots(tmp_path: Path) -> None:
     name = "my solver 1.2"
     asked = Overrides(solvers=(name,), options=(f"{name}.k=3",), plugin=tmp_path / f"{name}.py")
-    suite = overridden(read_suite(str(tiny_joint.write_suite(tmp_path))), asked)
+    suite = overridden(tiny_joint.suite(tmp_path), asked)
     (entry,) = with_key(suite, expand(suite)[0].key).solver
     assert entry.name == name
     assert entry.options == {"k": 3}
@@ -358,7 +354,7 @@ def test_a_version_is_exact(tmp_path: Path, requirement: str) -> None:
     with pytest.raises(InputError, match=r"NAME==VERSION, as piqp==0\.6\.2"):
         versions_asked(tmp_path, requirement)
     with pytest.raises(InputError, match=r"solver.1.with.*must be NAME==VERSION"):
-        read_suite(str(tiny_joint.write_suite(tmp_path, TWO + f'with = ["{requirement}"]\n')))
+        tiny_joint.suite(tmp_path, TWO + f'with = ["{requirement}"]\n')
 
 
 def test_only_true_and_false_are_truth_values(tmp_path: Path) -> None:
