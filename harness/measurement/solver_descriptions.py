@@ -16,7 +16,7 @@ from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from harness.results import records
 from harness.results.records import Row
-from harness.results.row_validation import PROBLEM, refuse_wrong_kinds
+from harness.results.row_validation import PROBLEM, valid_rows
 from harness.solving.solver_answer import shown
 from harness.solving.solver_session import OTHER_NAME, replaced
 from harness.solving.solver_version import version_of
@@ -170,9 +170,8 @@ def rows_in(directory: Path, console: Console) -> list[Row]:
     for path in paths:
         if records.remove_torn_line(path):
             console.print(f"{path}: the last line was cut off, and is left out.", style="yellow")
-    rows, problems = records.read(paths[0]), records.read(paths[-1])
-    refuse_wrong_kinds(paths[0], rows, needed=NEEDED)
-    refuse_wrong_kinds(paths[-1], problems, PROBLEM)
+    rows = valid_rows(paths[0], needed=NEEDED)
+    valid_rows(paths[-1], PROBLEM)
     return rows
 
 
