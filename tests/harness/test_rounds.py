@@ -4,7 +4,6 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +106,7 @@ def release(suite: Suite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ca
             ]
 
         def ended(words: Sequence[str]) -> int:
-            return suite_run.run(suite, Path(words[-1]), Console(file=StringIO()))
+            return suite_run.run(suite, Path(words[-1]), Console(quiet=True))
 
         monkeypatch.setattr(suite_run, "describe", describe)
         monkeypatch.setattr(suite_run, "provenance", lambda: {"commit": commit, "clean": True})
@@ -182,7 +181,7 @@ def test_a_row_of_a_round_is_measured_again_by_its_key(
     suite: Suite, release: Callable[..., list[Row]], tmp_path: Path
 ) -> None:
     again = next(row for row in release("first") if row["round"])
-    assert suite_run.run(suite, tmp_path / "again", Console(file=StringIO()), key=again["key"]) == 0
+    assert suite_run.run(suite, tmp_path / "again", Console(quiet=True), key=again["key"]) == 0
     (row,) = rows_of(tmp_path / "again")
     assert again["key"] == f"{row['key']} round={again['round']}"
 
@@ -254,7 +253,7 @@ def test_a_plug_in_over_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr("harness.measurement.task.datetime", clock)
         with (tmp_path / "exact.py").open("a") as file:
             file.write(f"# {minute}\n")
-        assert suite_run.run(read_suite(str(path)), out, Console(file=StringIO())) == 0
+        assert suite_run.run(read_suite(str(path)), out, Console(quiet=True)) == 0
     section = history.section(read_results(out))
     assert section is not None
     lines = shown(next(block for block in section.blocks if isinstance(block, Table)))[1:]
