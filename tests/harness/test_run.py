@@ -17,7 +17,7 @@ from commands import harness, wrong_usage
 from forked_processes import forked_command
 from refusals import refusal_of
 from rich.console import Console
-from suite_runs import gated, is_alive, moved, rows_of, said_by, wait_for
+from suite_runs import changed, gated, is_alive, moved, rows_of, said_by, wait_for
 
 from harness.measurement import task
 from harness.measurement.solver_descriptions import Description, resumed
@@ -196,15 +196,10 @@ def test_no_row_is_measured_beside_a_damaged_suite(copy: Path, folder: Path) -> 
 
 
 def test_gate_believes_the_answers_and_not_the_rows(copy: Path) -> None:
-    rows = rows_of(copy)
-    for row in rows:
-        row.update(verdict="outside", displacement_error_mm=1.0, reference_bound_mm=1.0)
-    records.rewrite(copy / records.MEASUREMENTS, rows)
+    changed(copy, verdict="outside", displacement_error_mm=1.0, reference_bound_mm=1.0)
     assert gated(copy)[0] == 0
-    for row in rows:
-        row.update(verdict="within", displacement_error_mm=0.0, limit_mm=1.0)
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    moved(copy / rows[2]["answer"], 2e-7)
+    changed(copy, verdict="within", displacement_error_mm=0.0, limit_mm=1.0)
+    moved(copy / rows_of(copy)[2]["answer"], 2e-7)
     code, text = gated(copy)
     assert code == 1
     assert "2.000e-07 mm from the reference" in text
