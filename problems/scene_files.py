@@ -49,6 +49,20 @@ def scene_names() -> list[str]:
     return sorted(names, key=lambda name: [(len(part), part) for part in name.split("/")])
 
 
+def is_scene_file(scene: object) -> bool:
+    """Whether a scene is given by the path of a file."""
+    return Path(str(scene)).suffix in (".toml", ".npz")
+
+
+def scene_name(name_or_path: str) -> str:
+    """The name of a scene that is given by its name, or by the path of a file, which need not be there."""
+    if not is_scene_file(name_or_path):
+        return name_or_path
+    path = resolved(Path(name_or_path))
+    is_users = not path.is_relative_to(SCENES)
+    return Path(name_or_path).stem if is_users else path.relative_to(SCENES).with_suffix("").as_posix()
+
+
 def read_scene(name_or_path: str) -> Scene:
     """Read and check a scene by name, by the path of a TOML file, or of an .npz with K, A, f, g.
 
@@ -69,16 +83,15 @@ def read_scene(name_or_path: str) -> Scene:
         if not path.is_file():
             raise InputError.one(path, "scene", name_or_path, "no such file")
         path = path.absolute()  # read when it is solved: perhaps in another folder, or by a worker
-        return MatricesScene(path.stem, f"own matrices {path.name}", (("problem", path),), sources=(path,))
+        name, title = scene_name(name_or_path), f"own matrices {path.name}"
+        return MatricesScene(name, title, (("problem", path),), sources=(path,))
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
             raise _unknown_scene(name_or_path, [*scene_names(), *EXAMPLES])
     table = read_toml(path)
-    is_users = not resolved(path).is_relative_to(SCENES)
-    name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()
     files, assembly = _files_of(path, table), path.parent / str(table.get("assembly", "."))
-    scene = _scene(name, path, table)
+    scene = _scene(scene_name(str(path)), path, table)
     files += _files_of(assembly, read_toml(assembly)) if isfile(assembly) else []
     return replace(scene, sources=tuple(dict.fromkeys(file.absolute() for file in files)))
 

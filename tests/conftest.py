@@ -89,10 +89,9 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from suite_runs import said_by
 
     from harness.measurement.suite_run import run
-    from harness.planning.suite import read_suite
 
     folder = tmp_path_factory.mktemp("finished")
-    suite = read_suite(str(tiny_joint.write_suite(folder, tolerances=[1e-6, 1e-8])))
+    suite = tiny_joint.suite(folder, tolerances=[1e-6, 1e-8])
     assert said_by(run, suite, folder / "finished")[0] == 0
     return folder / "finished"
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from harness.planning.suite import Suite, read_suite
+
 EXACT = """
 import numpy as np
 import scipy.linalg as sla
@@ -117,3 +119,8 @@ def write_suite(folder: Path, text: str = "", **keys: Any) -> Path:
     path = folder / "small.toml"
     path.write_text("\n".join([*lines, text or '[[solver]]\nname = "exact"\nforms = ["dual"]\n']))
     return path
+
+
+def suite(folder: Path, text: str = "", **keys: Any) -> Suite:
+    """The suite of `write_suite`, read."""
+    return read_suite(str(write_suite(folder, text, **keys)))

@@ -16,7 +16,7 @@ from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from harness.results import records
 from harness.results.records import Row
-from harness.results.row_validation import PROBLEM, refuse_wrong_kinds
+from harness.results.row_validation import PROBLEM, valid_rows
 from harness.solving.solver_answer import shown
 from harness.solving.solver_session import OTHER_NAME, replaced
 from harness.solving.solver_version import version_of
@@ -170,9 +170,8 @@ def rows_in(directory: Path, console: Console) -> list[Row]:
     for path in paths:
         if records.remove_torn_line(path):
             console.print(f"{path}: the last line was cut off, and is left out.", style="yellow")
-    rows, problems = records.read(paths[0]), records.read(paths[-1])
-    refuse_wrong_kinds(paths[0], rows, needed=NEEDED)
-    refuse_wrong_kinds(paths[-1], problems, PROBLEM)
+    rows = valid_rows(paths[0], needed=NEEDED)
+    valid_rows(paths[-1], PROBLEM)
     return rows
 
 
@@ -189,9 +188,9 @@ def resumed(
 
     def is_old(row: Row) -> bool:
         m, scene_key = planned.get(row["key"]), scene_keys.get(row["scene"])
-        if scene_key and (row.get("scene_key") or scene_key) != scene_key:
+        if scene_key and row.get("scene_key") != scene_key:
             return True
-        return m is not None and outdated(row, m, solvers[m.solver, m.entry.label], scene_keys[m.scene])
+        return m is not None and outdated(row, m, solvers[m.solver, m.entry.label])
 
     valid: list[Row] = []
     old: list[Row] = []
@@ -206,14 +205,13 @@ def resumed(
     return valid
 
 
-def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
-    """Whether a row has to be measured again.
+def outdated(row: Row, m: Measurement, solver: Description) -> bool:
+    """Whether a row of a scene as it is has to be measured again.
 
-    It is of another scene, series, solver or accuracy, hit a limit that is wider now, or has the status
+    It is of another series, solver or accuracy, hit a limit that is wider now, or has the status
     `not_run` of older versions; or a search tried what is asked for now: reports keep one row of a search.
     """
     current = {
-        "scene_key": scene_key,
         "solver_version": solver.version,
         "solver_code": solver.code,
         "limit_asked_mm": m.suite.limit_mm,

@@ -157,26 +157,22 @@ class Measuring:
     def tasks(self, remaining: list[Measurement]) -> Iterator[tuple[Pending, Task] | None]:
         """One task after another; a scene is opened before its first task of a family of forms."""
         opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
-        made = set[str]()  # the forms whose matrices are made
         for batch in self.due(remaining):
             if batch is None:
                 yield None
                 continue
             m = batch[0]
             if any(problem.scene.name != m.scene for problem in opened.values()):
-                opened, made = {}, set()
+                opened = {}
             family = form_family(m.form)
             if family not in opened:
                 with self.display.step(m.scene):
                     limit_s = m.suite.reference_limit_s
                     opened[family] = measurable(m.source, self.display, limit_s, m.form)
             problem = opened[family]
-            if m.form not in made:
-                _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
-                made.add(m.form)
+            _ = in_form(problem.prepared, m.form).arrays  # made before the clock starts
             self.display.progress(f"{m.scene}: {m.solver} {m.form}")
-            key = problem.scene_key if problem.scene.sources else ""
-            task = Task(batch, self.solvers[m.solver, m.entry.label], key)
+            task = Task(batch, self.solvers[m.solver, m.entry.label], problem.scene_key)
             self.running[m.key] = m
             yield (task, problem), task
 

@@ -29,12 +29,12 @@ from .worker import FinishedReport, measure, scene_to_measure
 class Task:
     """The work of one process: a measurement, or load cases of a series.
 
-    scene_key : that of the scene on whose reference the answers are judged; "": not told.
+    scene_key : that of the scene on whose reference the answers are judged.
     """
 
     batch: list[Measurement]
     solver: Description
-    scene_key: str = ""
+    scene_key: str
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,6 @@ def run_task(task: Task, answers: Path) -> TaskResult:
     has another version than the rows would have.
     """
     first = task.batch[0]
-    refuse_other_scene(task)
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     reports: list[FinishedReport]
     if task.solver.failure:
@@ -70,15 +69,11 @@ def run_task(task: Task, answers: Path) -> TaskResult:
     else:
         reports = [{"status": "unsupported", "message": f"takes {' and '.join(forms)} only"}] * len(batch)
     elapsed_s = time.monotonic() - start
-    refuse_other_scene(task)  # perhaps it has changed before the process read it
+    scene = read_scene(first.source)  # only now: it may have changed before the process read it
+    if scene.sources and scene.key != task.scene_key:
+        allowed = f"the file that the run has read: {CHANGED}"
+        raise InputError.one(first.source, "scene", "another", allowed)
     return TaskResult(reports, elapsed_s)
-
-
-def refuse_other_scene(task: Task) -> None:
-    """Raise InputError if the file of the scene is another than that on which the answers are judged."""
-    source = task.batch[0].source
-    if task.scene_key and read_scene(source).key != task.scene_key:
-        raise InputError.one(source, "scene", "another", f"the file that the run has read: {CHANGED}")
 
 
 def run_task_on_worker(task: Task) -> TaskResult:

@@ -58,7 +58,7 @@ class FinishedReport(Report, total=False):
 
 
 class Unsupported(InvalidAnswer):
-    """The solver does not take this form or way of solving; the text says what it takes."""
+    """The solver does not take this way of solving; the text says which it takes."""
 
     status = "unsupported"
 
@@ -121,8 +121,6 @@ class Run(Reporter):
         self.events.report(version=version_of(m.solver, solver, plugin))
         own = {"time_limit_s": OWN_LIMIT * m.time_limit_s, "iteration_limit": m.iteration_limit}
         vars(solver).update(own, prints=True)  # it may be frozen
-        if m.form not in solver.forms:
-            raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.step("load_s"):
             scene = scene_to_measure(self.measurements)
             problem = in_form(prepared(scene, form=m.form), m.form)

@@ -91,7 +91,6 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             allowed = ", ".join(map(str, sorted(set(sizes.values()))))
             faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
         data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
-    plugin = str(resolved(Path(change.plugin))) if change.plugin else suite.plugin
     versions = _versions(change, faults)
     solvers = [*change.solvers, *(name for name in versions if name not in change.solvers)]
     if solvers:
@@ -101,17 +100,12 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     data["solver"] += [{"name": name} for name in (*solvers, *plugins) if name not in named]
     faults += unused(change.plugin, [entry["name"] for entry in data["solver"]])
     data["solver"] = [entry | at for entry in data["solver"] for at in versions.get(entry["name"], [{}])]
-    changes = {
-        "tolerances": change.tolerances if change.tolerances == "auto" else list(change.tolerances),
-        "repeats": change.repeats,
-        "threads": list(change.threads),
-        "time_limit_s": change.time_limit_s,
-        "memory_limit_mib": change.memory_limit_mib,
-        "reference_limit_s": change.reference_limit_s,
-        "plugin": plugin,
-    }
-    changes = {key: value for key, value in changes.items() if value not in ([], None)}
+    names = ("tolerances", "repeats", "threads", "time_limit_s", "memory_limit_mib", "reference_limit_s")
+    asked = {name: getattr(change, name) for name in names}
+    changes = {name: value for name, value in asked.items() if value not in ((), [], None)}
     data |= changes
+    if change.plugin:
+        data["plugin"] = str(resolved(Path(change.plugin)))
     if "time_limit_s" in changes:
         data.pop("time_limit_by_size_s", None)
     others = [scene for scene in data["scenes"] if scene not in suite.scenes]

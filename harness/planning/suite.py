@@ -35,7 +35,7 @@ from problems.input.bounded_types import (
 )
 from problems.ladders import prefix_of, rung_names
 from problems.random_scenes import EXAMPLES, drawn_names
-from problems.scene_files import SCENES, read_scene, read_toml, scene_names
+from problems.scene_files import is_scene_file, read_scene, read_toml, scene_name, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names
 
@@ -189,7 +189,7 @@ def suite_from(data: dict[str, Any], path: Path) -> Suite:
         data["plugin"] = str(resolved(path.parent / data["plugin"]))
     for entry in _entries(data):
         if isinstance(scenes := entry.get("scenes"), list):
-            entry["scenes"] = [str(resolved(path.parent / s)) if _is_file(s) else s for s in scenes]
+            entry["scenes"] = [str(resolved(path.parent / s)) if is_scene_file(s) else s for s in scenes]
     faults += _unknown_solvers(data, path)
     return validated(data, path, faults)
 
@@ -218,7 +218,7 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
     """
     scenes: dict[str, None] = {}
     for pattern in map(str, patterns):
-        if _is_file(pattern):
+        if is_scene_file(pattern):
             path = resolved(base / pattern)
             if not path.is_file():
                 faults.append(Fault(where, key, pattern, "no such file"))
@@ -231,19 +231,6 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
             faults.append(Fault(where, key, pattern, unknown("scene", pattern, [*packaged, *EXAMPLES])))
         scenes |= dict.fromkeys(names)
     return list(scenes) or list(map(str, patterns))
-
-
-def _is_file(scene: object) -> bool:
-    """Whether a scene is given by the path of a file."""
-    return Path(str(scene)).suffix in (".toml", ".npz")
-
-
-def _name_of(scene: str) -> str:
-    """The name of a scene that is given by its name or by the path of a file."""
-    if not _is_file(scene):
-        return scene
-    path = Path(scene).with_suffix("")
-    return path.relative_to(SCENES).as_posix() if path.is_relative_to(SCENES) else path.name
 
 
 def _entries(data: dict[str, Any]) -> list[dict[str, Any]]:
@@ -284,7 +271,7 @@ def _elsewhere(suite: Suite, path: Path) -> Iterator[Fault]:
     for k, entry in enumerate(suite.solver):
         for scene in entry.scenes or ():
             alone = entry.model_copy(update={"scenes": [scene]})
-            if not any(alone.takes(_name_of(each), each) for each in suite.scenes):
+            if not any(alone.takes(scene_name(each), each) for each in suite.scenes):
                 allowed = "a scene among those of the suite, or a glob of some"
                 yield Fault(str(path), f"solver.{k}.scenes", scene, allowed)
 
@@ -320,7 +307,7 @@ def _planned_twice(suite: Suite, one: SolverEntry, other: SolverEntry) -> Iterat
     form = min({*(one.forms or ["dual"])} & {*(other.forms or ["dual"])}, default="")
     threads = min({*(one.threads or suite.threads)} & {*(other.threads or suite.threads)}, default=0)
     for scene in suite.scenes if tolerance and form and threads else ():
-        name = _name_of(scene)
+        name = scene_name(scene)
         if one.takes(name, scene) and other.takes(name, scene):
             words = [name, one.name, form, *filter(None, [one.label]), f"tol={tolerance}"]
             yield scene, " ".join([*words, f"threads={threads}"])

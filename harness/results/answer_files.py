@@ -13,7 +13,6 @@ from problems.input.bounded_types import MIB
 from . import records
 
 ARCHIVE = "answers.zip"
-ANSWER_MIB = 1024  # the largest file of an answer that is read
 
 
 def is_kept(path: Path) -> bool:
@@ -28,12 +27,12 @@ def read_answer(path: Path) -> dict[str, NDArray[Any]]:
     """
     archive = path.parent.with_name(ARCHIVE)
     if path.exists() or not archive.is_file():
-        return records.read_arrays(path, ANSWER_MIB)
+        return records.read_arrays(path)
     try:
         with zipfile.ZipFile(archive) as file:
             member = file.getinfo(path.name)
-            if member.file_size > ANSWER_MIB * MIB:
-                raise ValueError(f"{path.name}: larger than {ANSWER_MIB} MiB")
+            if member.file_size > records.ARRAYS_MIB * MIB:
+                raise ValueError(f"{path.name}: larger than {records.ARRAYS_MIB} MiB")
             return records.read_arrays(io.BytesIO(file.read(member)))
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError) as error:
         raise ValueError(f"{archive}: {error}") from error

@@ -31,15 +31,11 @@ ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read
 OTHER = "name another directory with --out"
 
 
-def to_line(row: Row) -> str:
-    """One line of strict JSON: non-finite numbers become null, and lone surrogates, as in a file name that is
-    not UTF-8, their JSON escapes.
+def to_line(row: Row, indent: int | None = None) -> str:
+    """Strict JSON, one line unless it is indented: non-finite numbers become null, and lone surrogates, as in
+    a file name that is not UTF-8, their JSON escapes.
     """
-    return _json(_plain(row))
-
-
-def _json(content: Row, indent: int | None = None) -> str:
-    text = json.dumps(content, ensure_ascii=False, allow_nan=False, indent=indent)
+    text = json.dumps(_plain(row), ensure_ascii=False, allow_nan=False, indent=indent)
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -137,7 +133,7 @@ def rewrite(path: Path, rows: list[Row]) -> None:
 
 def replace_object(path: Path, content: Row) -> None:
     """Write a JSON object, atomically."""
-    replace_text(path, _json(_plain(content), indent=1) + "\n")
+    replace_text(path, to_line(content, indent=1) + "\n")
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -152,10 +148,10 @@ def replace_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
         np.savez(file, **arrays)
 
 
-def read_arrays(source: Path | BinaryIO, mib: float = ARRAYS_MIB) -> dict[str, NDArray[Any]]:
+def read_arrays(source: Path | BinaryIO) -> dict[str, NDArray[Any]]:
     """The arrays of a .npz file, whose CRC is checked. Raises ValueError if it is none."""
     try:
-        opened = regular_file(source, "content", mib) if isinstance(source, Path) else source
+        opened = regular_file(source, "content", ARRAYS_MIB) if isinstance(source, Path) else source
         with np.load(opened) as file:
             arrays = dict(file)
     except InputError:

@@ -26,13 +26,14 @@ MEASUREMENT = model_of("Measurement", FIELDS)
 PROBLEM = model_of("Problem", PROBLEM_FIELDS)
 
 
-def refuse_wrong_kinds(
-    path: Path,
-    rows: Sequence[Row],
-    model: type[BaseModel] = MEASUREMENT,
-    needed: Sequence[str] = ("scene",),
-) -> None:
-    """Raise InputError naming file, line and field if a field is of another kind, or a needed one is null."""
+def valid_rows(
+    path: Path, model: type[BaseModel] = MEASUREMENT, needed: Sequence[str] = ("scene",)
+) -> list[Row]:
+    """The rows of a file; none if there is none.
+
+    Raises InputError naming file, line and field if a field is of another kind, or a needed one is null.
+    """
+    rows = records.read(path)
     faults: list[Fault] = []
     for number, row in enumerate(rows, start=1):
         try:
@@ -49,25 +50,24 @@ def refuse_wrong_kinds(
         ]
     if faults:
         raise InputError(faults[:MAX_FAULTS])
+    return rows
 
 
 def measured_rows(directory: Path, needed: Sequence[str] = ("scene",)) -> list[Row]:
-    """The rows of DIRECTORY, at least one. Raises InputError, as `refuse_wrong_kinds` does."""
+    """The rows of DIRECTORY, at least one. Raises InputError, as `valid_rows` does."""
     path = directory / records.MEASUREMENTS
     if not path.is_file():
         raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
-    rows = records.read(path)
+    rows = valid_rows(path, needed=needed)
     if not rows:
         raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
-    refuse_wrong_kinds(path, rows, needed=needed)
     return rows
 
 
 def refuse_unreadable(directory: Path) -> None:
     """Raise InputError, naming file and line, unless the rows of DIRECTORY can be reported on."""
     measured_rows(directory)
-    problems = directory / "problems.jsonl"
-    refuse_wrong_kinds(problems, records.read(problems), PROBLEM)
+    valid_rows(directory / "problems.jsonl", PROBLEM)
     faults = list[Fault]()
     for path in sorted([*directory.glob("machine*.json"), *directory.glob("scenes/*.npz")]):
         try:

@@ -113,11 +113,6 @@ def _begin(connection: sqlite3.Connection, mode: str) -> None:
             connection.rollback()
 
 
-def _begun(path: Path) -> bool:
-    """Whether there is a file; SQLite makes an empty one before it writes."""
-    return path.exists() and (not path.is_file() or path.stat().st_size > 0)
-
-
 def write_fact(directory: Path, name: str, value: str | bytes) -> None:
     """Write or replace a fact; the first one makes the tables."""
     with connected(directory, "EXCLUSIVE") as connection:
@@ -148,7 +143,7 @@ def append(directory: Path, cases: Iterable[tuple[Row, Gaps | None]]) -> None:
 def read_facts(directory: Path) -> dict[str, Any] | None:
     """The value of `series`; None if there is none yet. Raises InputError if it is damaged."""
     path = directory / SERIES
-    if not _begun(path):
+    if not path.exists() or (path.is_file() and path.stat().st_size == 0):  # SQLite begins with an empty one
         return None
     with connected(directory) as connection:
         fact = connection.execute(FACTS).fetchone()

@@ -20,7 +20,7 @@ from harness.results.answer_files import is_kept
 from harness.results.atomic_output import refuse_outputs
 from harness.results.counted_rows import counting
 from harness.results.records import Row
-from harness.results.row_validation import MEASUREMENT, refuse_wrong_kinds
+from harness.results.row_validation import MEASUREMENT, valid_rows
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from problems.errors import InputError
@@ -141,8 +141,7 @@ def gate(
     named = {"--json": json_file, "--junit": junit_file}
     outputs = {option: Path(file) if file else None for option, file in named.items()}
     refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])
-    made = records.read(folder / records.MEASUREMENTS)
-    refuse_wrong_kinds(folder / records.MEASUREMENTS, made, GATED, NEEDED)
+    made = valid_rows(folder / records.MEASUREMENTS, GATED, NEEDED)
     rows = {row["key"]: row for row in counting(made) if row["gated"]}
     refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
     standard = read_baseline(base, margin, str(folder), rows.values(), max_slowdown) if base else None

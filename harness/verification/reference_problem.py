@@ -38,7 +38,7 @@ class ReferenceProblem:
     limit_s : after it no further candidate for the reference is tried. case : the number of the load case in
     a series; None for the scene's own. first : candidates that are tried before the in-house methods.
     locks_proven : whether the answers of earlier stages, in which fasteners lock, are proven; if not, nor is
-    the reference. scene_key : that of the scene before its files were read, from `measurable` alone.
+    the reference. scene_key : that of the scene before its files were read; none of a stage alone.
     """
 
     scene: Scene
@@ -115,9 +115,10 @@ def open_problem(
     scene: Scene, form: Form = "dual", reporter: Reporter = SILENT, limit_s: float | None = None
 ) -> ReferenceProblem:
     """Open or build the problem of a scene, or of its last stage; see `open_stage`. Raises InputError."""
+    key = scene.key  # its files may change when they have been read
     last, locks_proven = last_stage(scene, limit_s)
     opened = open_stage(last, form, reporter, limit_s)
-    return replace(opened, scene=scene, locks_proven=locks_proven)
+    return replace(opened, scene=scene, locks_proven=locks_proven, scene_key=key)
 
 
 def open_stage(
@@ -183,8 +184,7 @@ def measurable(
     also if K is not positive definite.
     """
     scene = read_scene(source) if isinstance(source, str) else source
-    key = scene.key  # its files may change when they have been read
-    problem = replace(open_problem(scene, form, reporter, limit_s), scene_key=key)
+    problem = open_problem(scene, form, reporter, limit_s)
     refuse_without_contacts(problem.prepared, problem.scene.source_of("A"))
     reporter.progress("factors of K")
     problem.prepared.assembly.K.ensure_factored()

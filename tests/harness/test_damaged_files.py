@@ -189,7 +189,10 @@ def test_fewer_cases_are_reported_as_that_many(solved: Path, tmp_path: Path) -> 
     assert re.search(r"solved +\| 4 of 4 cases", (series / "report" / "report.md").read_text())
 
 
-@pytest.mark.parametrize(("name", "value"), [("key", None), ("time_limit_s", "a")])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [*((name, None) for name in ("key", "verdict", "tolerance", "repeat")), ("time_limit_s", "a")],
+)
 def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, copy: Path) -> None:
     changed(copy, **{name: value})
     assert f"measurements.jsonl: line 1: {name}" in wrong_usage("run", copy, "--out", copy)

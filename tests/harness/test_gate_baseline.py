@@ -54,14 +54,6 @@ def test_no_scene_is_opened_without_kept_answers(copy: Path, monkeypatch: pytest
     assert "Nothing could be judged" in done.output
 
 
-def test_a_row_without_the_field_of_its_answer_has_none(copy: Path, tmp_path: Path) -> None:
-    rows = [{name: value for name, value in row.items() if name != "answer"} for row in rows_of(copy)]
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    assert gate(copy, "--json", tmp_path / "gate.json").exit_code == 3
-    findings = json.loads((tmp_path / "gate.json").read_text())["measurements"]
-    assert {finding["why"] for finding in findings} == {"solved: no answer"}
-
-
 @pytest.mark.parametrize("errors", [(3e-9, 2e-9, 1e-9), (1e-9, 2e-9, 3e-9)])
 def test_the_largest_error_of_repeats_counts(finished: Path, copy: Path, errors: tuple[float, ...]) -> None:
     first = rows_of(copy)[0]

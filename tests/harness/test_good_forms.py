@@ -82,13 +82,13 @@ def test_limits_go_by_size():
 
 def test_a_row_out_of_time_stands_until_there_is_more_of_it():
     m = next(m for m in plan() if m.time_limit_s == 40)
-    facts = {"scene_key": "s", "solver_version": "1", "solver_code": "c", "gated": True}
+    facts = {"solver_version": "1", "solver_code": "c", "gated": True}
     facts |= {"limit_asked_mm": m.suite.limit_mm, "status": "time_limit"}
     rows = [row(m.scene, m.form, None, **facts, time_limit_s=limit) for limit in (40.0, 39.0)]
     rows.append(rows[0] | {"status": "not_run"})
     solver = Description(["primal"], "1", "c")
-    assert [outdated(each, m, solver, "s") for each in rows] == [False, True, True]
-    assert not outdated(rows[1], replace(m, time_limit_s=39.0), solver, "s")
+    assert [outdated(each, m, solver) for each in rows] == [False, True, True]
+    assert not outdated(rows[1], replace(m, time_limit_s=39.0), solver)
 
 
 def test_a_written_suite_may_have_a_key_of_an_older_version(tmp_path):

@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,13 @@ from suite_runs import all_end
 
 from harness.measurement import child_process
 from harness.measurement.solver_descriptions import Description
-from harness.measurement.task import Task, run_task, run_task_on_worker
+from harness.measurement.task import Task, run_task
 from harness.measurement.worker import FinishedReport, measure
 from harness.planning.plan import Measurement
 from harness.planning.suite import SolverEntry, Suite
 from problems.errors import InputError
 from problems.scene_files import read_scene
+from solvers.base import Form
 
 pytestmark = pytest.mark.slow
 starts = pytest.mark.starts
@@ -40,23 +42,24 @@ def _cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
 
 
-def outcome(
-    folder: Path,
-    fault: str | None = None,
-    to: str = "answer.npz",
-    solver: str = "",
-    plugin: bool = True,
-    memory_limit_mib: int = 8192,
-    **changes: Any,
-) -> FinishedReport:
-    """The row of a measurement, which leaves no process, not even one whose parent is gone."""
-    name = solver or ("faulty" if fault else "exact")
-    entry = SolverEntry(name=name, options={"fault": fault} if fault else {})
+def measurement(
+    folder: Path, name: str = "gi", plugin: bool = False, memory_limit_mib: int = 8192, **changes: Any
+) -> Measurement:
+    """Of a solver on the tiny scene; a plug-in is its file in the folder."""
+    options = {"fault": fault} if (fault := changes.pop("fault", None)) else {}
+    entry = SolverEntry(name=name, options=options)
     file = str(folder / f"{name}.py") if plugin else None
     suite = Suite(name="s", scenes=["tiny"], memory_limit_mib=memory_limit_mib, plugin=file, solver=[entry])
     asked = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
-    m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked | changes)
-    (row,) = measure([m], [folder / to])
+    return Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked | changes)
+
+
+def outcome(
+    folder: Path, fault: str | None = None, to: str = "answer.npz", plugin: bool = True, **changes: Any
+) -> FinishedReport:
+    """The row of a measurement, which leaves no process, not even one whose parent is gone."""
+    name = changes.pop("solver", "faulty" if fault else "exact")
+    (row,) = measure([measurement(folder, name, plugin, fault=fault, **changes)], [folder / to])
     assert all_end(folder / "cache")
     return row
 
@@ -73,14 +76,14 @@ def test_a_worker_that_dies_before_it_has_its_job(folder: Path, monkeypatch: pyt
         return process
 
     monkeypatch.setattr(subprocess, "Popen", stillborn)
-    row = outcome(folder, None)
+    row = outcome(folder)
     assert row["status"] == "crashed"
     assert "SIGKILL" in row["message"]
 
 
 @starts
 def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
-    row = outcome(folder, None, memory_limit_mib=MIB)
+    row = outcome(folder, memory_limit_mib=MIB)
     assert row["status"] == "solved"
     assert row["answer"] == "answers/answer.npz"
     assert row["threads"] == 1
@@ -105,7 +108,7 @@ def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
 def test_what_an_answer_needed_from_the_scene_on(folder: Path, solver: str, form: str, stages: str) -> None:
     """In the sparse form the process makes the model; in a dense one it opens the stages it needs."""
     scene = dict.fromkeys(("scene", "source"), "gallery/heavy-sheet-on-tool")
-    row = outcome(folder, None, **scene, solver=solver, form=form, plugin=False)
+    row = outcome(folder, **scene, solver=solver, form=form, plugin=False)
     assert row["status"] == "solved"
     assert row["stages"] == stages
     if form == "sparse":
@@ -149,7 +152,7 @@ def test_a_fault_is_a_status_with_a_reason(folder: Path, fault: str, status: str
 def test_the_start_does_not_count_against_the_time_limit(folder: Path) -> None:
     slow = folder / "slow.py"
     slow.write_text("import time\ntime.sleep(1)\n" + tiny_joint.EXACT)
-    row = outcome(folder, None, solver="slow", time_limit_s=0.5)
+    row = outcome(folder, solver="slow", time_limit_s=0.5)
     assert row["status"] == "solved"
 
 
@@ -193,64 +196,47 @@ def test_an_orphan_that_is_in_no_list_yet_is_killed_too(monkeypatch: pytest.Monk
     assert killed == [11, 12]
 
 
-def measurement(folder: Path) -> Measurement:
-    entry = SolverEntry(name="gi")
-    suite = Suite(name="s", scenes=["tiny"], solver=[entry])
-    asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
-    return Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
-
-
-def test_another_scene_than_that_of_the_reference_is_refused(folder: Path) -> None:
-    """It has changed meanwhile, or is older on a worker: right answers would be judged as wrong ones."""
-    task = Task([measurement(folder)], Description(["dual"], "1", "code"), "of another file")
-    with pytest.raises(InputError, match="it has changed since, or is another on this worker"):
-        run_task(task, folder)
-    with pytest.raises(InputError, match="the file that the run has read"):
-        run_task_on_worker(task)
+def task_of(m: Measurement, form: Form = "dual", version: str = "1") -> Task:
+    return Task([m], Description([form], version, "code"), read_scene(m.source).key)
 
 
 def test_a_scene_that_changes_before_its_process_reads_it_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Right answers would be judged as wrong ones; that of a worker may be another from the beginning."""
+
     def changing(*of: Any) -> list[FinishedReport]:
         tiny_joint.write_problem(tmp_path / "tiny.npz", shift=1.0)
         return [{"status": "solved"}]
 
     tiny_joint.write_problem(tmp_path / "tiny.npz")
-    m = measurement(tmp_path)
+    task = task_of(measurement(tmp_path))
     monkeypatch.setattr("harness.measurement.task.measure", changing)
-    with pytest.raises(InputError, match="it has changed since"):
-        run_task(Task([m], Description(["dual"], "1", "code"), read_scene(m.source).key), tmp_path)
+    with pytest.raises(InputError, match="it has changed since, or is another on this worker"):
+        run_task(task, tmp_path)
 
 
-def test_a_scene_without_files_is_not_made_again_to_be_compared(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scene_without_files_is_not_made_again_to_be_compared(folder: Path) -> None:
     """The key of a rung takes all its matrices."""
-    monkeypatch.setattr("harness.measurement.task.read_scene", None)  # not called
-    task = Task([measurement(folder)], Description(["primal"], "1", "code"))
+    rung = replace(measurement(folder), source="hard/pivoting/fathi-008")
+    task = replace(task_of(rung, "primal"), scene_key="not compared")
     assert run_task(task, folder).reports[0]["status"] == "unsupported"
 
 
 def test_another_plug_in_than_the_one_described_is_refused(folder: Path) -> None:
     """It was edited meanwhile, or is older on a worker: its row would have the version of the other."""
-    entry = SolverEntry(name="exact")
-    suite = Suite(name="s", scenes=["tiny"], plugin=str(folder / "exact.py"), solver=[entry])
-    asked: Any = {"scene": "tiny", "source": str(folder / "tiny.npz"), "form": "dual", "time_limit_s": 20.0}
-    m = Measurement(suite, entry, tolerance=1e-9, threads=1, repeat=0, **asked)
-    task = Task([m], Description(["dual"], "sha256:of another", "code"))
+    task = task_of(measurement(folder, "exact", plugin=True), version="sha256:of another")
     with pytest.raises(InputError, match=r"exact\.py: version = 'sha256:\w+': sha256:of another, as at"):
         run_task(task, folder)
 
 
 def test_another_version_of_a_solver_than_the_one_described_is_refused(folder: Path) -> None:
     """A worker has another one installed: its row would have the version of the driver's."""
-    task = Task([measurement(folder)], Description(["dual"], "0.0.1", "code"))
+    task = task_of(measurement(folder), version="0.0.1")
     with pytest.raises(InputError, match=r"solver gi: version = '.+': 0\.0\.1, as at the beginning"):
         run_task(task, folder)
 
 
 def test_a_full_disk_is_not_the_solvers_fault(folder: Path) -> None:
-    assert (
-        str(folder / "missing" / "answer.npz") in outcome(folder, None, "missing/answer.npz")["cannot_save"]
-    )
+    failed = outcome(folder, to="missing/answer.npz")
+    assert str(folder / "missing" / "answer.npz") in failed["cannot_save"]

@@ -13,7 +13,6 @@ from strip_scene import write_strip
 from suite_runs import rows_of, said_by
 
 from harness.measurement.suite_run import run as run_suite
-from harness.planning.suite import read_suite
 from harness.results import series_file
 from harness.results.provenance import HOOK_VARIABLES, ROOT, fingerprints, provenance
 from harness.series.run import run as run_series
@@ -136,7 +135,7 @@ def test_two_files_of_one_name_have_a_hash_each(tmp_path: Path, monkeypatch: pyt
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:
     here = provenance()
-    suite = read_suite(str(tiny_joint.write_suite(tmp_path, '[[solver]]\nname = "newton"\n')))
+    suite = tiny_joint.suite(tmp_path, '[[solver]]\nname = "newton"\n')
     said_by(run_suite, suite, tmp_path / "suite")
     scene = read_scene(str(write_strip(tmp_path)))
     job = Job(scene=scene, cases=random_gaps(scene, 3, 0), form="dual", check=0, threads=1)

@@ -4,7 +4,6 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +84,7 @@ class Clock:
 @pytest.fixture
 def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Suite:
     """Its measurements are made in this process, and published by `release`."""
-    made = read_suite(str(tiny_joint.write_suite(tmp_path, SUITE)))
+    made = tiny_joint.suite(tmp_path, SUITE)
     monkeypatch.setattr(suite_run, "run_task", measured_here)
     monkeypatch.setattr(suite_run, "datetime", Clock(timedelta(minutes=1)))
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
@@ -107,7 +106,7 @@ def release(suite: Suite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ca
             ]
 
         def ended(words: Sequence[str]) -> int:
-            return suite_run.run(suite, Path(words[-1]), Console(file=StringIO()))
+            return suite_run.run(suite, Path(words[-1]), Console(quiet=True))
 
         monkeypatch.setattr(suite_run, "describe", describe)
         monkeypatch.setattr(suite_run, "provenance", lambda: {"commit": commit, "clean": True})
@@ -182,12 +181,12 @@ def test_a_row_of_a_round_is_measured_again_by_its_key(
     suite: Suite, release: Callable[..., list[Row]], tmp_path: Path
 ) -> None:
     again = next(row for row in release("first") if row["round"])
-    assert suite_run.run(suite, tmp_path / "again", Console(file=StringIO()), key=again["key"]) == 0
+    assert suite_run.run(suite, tmp_path / "again", Console(quiet=True), key=again["key"]) == 0
     (row,) = rows_of(tmp_path / "again")
     assert again["key"] == f"{row['key']} round={again['round']}"
 
 
-def test_a_row_that_is_no_longer_planned_is_not_kept(
+def test_rows_that_are_still_planned_are_kept_with_the_scenes_that_they_need(
     suite: Suite, release: Callable[..., list[Row]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     release("first")
@@ -195,11 +194,6 @@ def test_a_row_that_is_no_longer_planned_is_not_kept(
     monkeypatch.setattr(published, "read_suite", lambda name: smaller)
     published.begin("small", directory := published.STAGED / "second")
     assert {row["variant"] for row in rows_of(directory) if row["beside_round"]} == {"a"}
-
-
-def test_what_matrices_took_is_kept_beside_the_rows_that_need_it(release: Callable[..., list[Row]]) -> None:
-    release("first")
-    published.begin("small", directory := published.STAGED / "second")
     problems, kept = (folder / "problems.jsonl" for folder in (published.PUBLISHED / "small", directory))
     assert kept.read_text() == problems.read_text()
 
@@ -242,7 +236,7 @@ def test_the_last_iterate_of_what_stops_by_itself_is_judged(suite: Suite, tmp_pa
     (m,) = expand(late)
     answers = tmp_path / "answers"
     answers.mkdir()
-    task = Task([replace(m, time_limit_s=0.01)], Description(["dual"], "1", "code"))
+    task = Task([replace(m, time_limit_s=0.01)], Description(["dual"], "1", "code"), "")
     (report,) = measured_here(task, answers).reports
     assert (report["status"], report["iterations"]) == ("time_limit", 7)
     assert report["message"] == f"stopped by itself after {OWN_LIMIT * 0.01:g} s, with its last iterate"
@@ -259,7 +253,7 @@ def test_a_plug_in_over_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr("harness.measurement.task.datetime", clock)
         with (tmp_path / "exact.py").open("a") as file:
             file.write(f"# {minute}\n")
-        assert suite_run.run(read_suite(str(path)), out, Console(file=StringIO())) == 0
+        assert suite_run.run(read_suite(str(path)), out, Console(quiet=True)) == 0
     section = history.section(read_results(out))
     assert section is not None
     lines = shown(next(block for block in section.blocks if isinstance(block, Table)))[1:]

@@ -17,7 +17,7 @@ from commands import harness, wrong_usage
 from forked_processes import forked_command
 from refusals import refusal_of
 from rich.console import Console
-from suite_runs import gated, is_alive, moved, rows_of, said_by, wait_for
+from suite_runs import changed, gated, is_alive, moved, rows_of, said_by, wait_for
 
 from harness.measurement import task
 from harness.measurement.solver_descriptions import Description, resumed
@@ -61,9 +61,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def finished(folder: Path) -> Path:
     """A directory with the rows of a run; tests take a `copy`."""
-    code, text = said_by(
-        run, read_suite(str(tiny_joint.write_suite(folder, TWO, yardstick=True))), folder / "finished"
-    )
+    code, text = said_by(run, tiny_joint.suite(folder, TWO, yardstick=True), folder / "finished")
     assert code == 0
     assert "4 measurements" in text
     return folder / "finished"
@@ -98,36 +96,23 @@ def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
 
 
 def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
+    """Torn lines are left out, also of the files of which `report` says that `run` does it."""
     lines = (copy / records.MEASUREMENTS).read_bytes().splitlines(keepends=True)
     (copy / records.MEASUREMENTS).write_bytes(lines[0] + lines[1] + lines[2] + lines[3][:50])
+    others = ("problems.jsonl", records.OUTDATED)
+    for name in others:
+        with (copy / name).open("ab") as file:
+            file.write(b'{"torn')
     code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
     assert code == 0
-    assert "the last line was cut off" in text
+    for name in (records.MEASUREMENTS, *others):
+        assert f"{name}: the last line was cut off" in text.replace("\n", "")
+    assert [len(records.read(copy / name)) for name in others] == [1, 0]
     assert "4 measurements, 3 of them already" in text
     again = (copy / records.MEASUREMENTS).read_bytes().splitlines(keepends=True)
     assert again[:3] == lines[:3]
     assert len(again) == 4
     assert json.loads(again[3])["key"] == json.loads(lines[3])["key"]
-
-
-@pytest.mark.parametrize("name", ["problems.jsonl", records.OUTDATED])
-def test_a_torn_line_of_another_file_is_left_out_too(copy: Path, folder: Path, name: str) -> None:
-    """`report` refuses it, and says that `run` into the same directory removes it."""
-    before = records.read(copy / name)
-    with (copy / name).open("ab") as file:
-        file.write(b'{"torn')
-    code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
-    assert code == 0
-    assert f"{name}: the last line was cut off" in text.replace("\n", "")
-    assert records.read(copy / name) == before
-
-
-@pytest.mark.parametrize("name", ["verdict", "tolerance", "repeat"])
-def test_a_row_that_lacks_what_a_run_reads_is_named(copy: Path, folder: Path, name: str) -> None:
-    rows = rows_of(copy)
-    del rows[1][name]
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    assert f"line 2: {name}" in wrong_usage("run", folder / "small.toml", "--out", copy)
 
 
 def test_scenes_that_cannot_be_read_end_a_run_before_it_measures(
@@ -155,19 +140,6 @@ def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path)
     assert [row[name] for row, name in zip(aside, names, strict=True)] == ["an older one"] * 3
     assert {row["answer"] for row in aside} == {None}
     assert len(rows_of(copy)) == 4
-
-
-class Uncompared(Row):
-    def __eq__(self, other: object) -> bool:
-        raise AssertionError("compared with another row")
-
-
-def test_all_rows_are_set_aside_in_one_pass(copy: Path) -> None:
-    rows = rows_of(copy)
-    plan = expand(read_written(copy / "suite.toml"))
-    solvers = {("exact", ""): Description(["dual"], "another version", "another code")}
-    assert resumed(copy, [*map(Uncompared, rows)], plan, solvers, Console(quiet=True)) == rows_of(copy) == []
-    assert len(records.read(copy / records.OUTDATED)) == len(rows)
 
 
 def test_no_row_of_a_scene_that_has_changed_stays(copy: Path) -> None:
@@ -224,15 +196,10 @@ def test_no_row_is_measured_beside_a_damaged_suite(copy: Path, folder: Path) -> 
 
 
 def test_gate_believes_the_answers_and_not_the_rows(copy: Path) -> None:
-    rows = rows_of(copy)
-    for row in rows:
-        row.update(verdict="outside", displacement_error_mm=1.0, reference_bound_mm=1.0)
-    records.rewrite(copy / records.MEASUREMENTS, rows)
+    changed(copy, verdict="outside", displacement_error_mm=1.0, reference_bound_mm=1.0)
     assert gated(copy)[0] == 0
-    for row in rows:
-        row.update(verdict="within", displacement_error_mm=0.0, limit_mm=1.0)
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    moved(copy / rows[2]["answer"], 2e-7)
+    changed(copy, verdict="within", displacement_error_mm=0.0, limit_mm=1.0)
+    moved(copy / rows_of(copy)[2]["answer"], 2e-7)
     code, text = gated(copy)
     assert code == 1
     assert "2.000e-07 mm from the reference" in text
@@ -307,11 +274,13 @@ def test_gate_takes_a_missing_answer_for_lost_accuracy(copy: Path, harm: str) ->
     assert harm != "no_suite" or "suite.toml" in text
 
 
-@pytest.mark.parametrize("rows_kept", ["none", "all_failed", "none_gated"])
+@pytest.mark.parametrize("rows_kept", ["none", "all_failed", "no_field", "none_gated"])
 def test_gate_with_nothing_to_judge(copy: Path, rows_kept: str) -> None:
     rows = [] if rows_kept == "none" else rows_of(copy)
     for row in rows:
-        row.update({"answer": None} if rows_kept == "all_failed" else {"gated": False})
+        row.update({"gated": False} if rows_kept == "none_gated" else {"answer": None})
+        if rows_kept == "no_field":
+            del row["answer"]
     records.rewrite(copy / records.MEASUREMENTS, rows)
     code, text = gated(copy)
     assert code == 3

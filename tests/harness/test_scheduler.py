@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,6 @@ from harness.measurement import scheduler
 from harness.measurement.monitored_call import TRIM, environment
 from harness.measurement.scheduler import TASKS_PER_WORKER, done_as_completed, versions, workers
 from harness.measurement.suite_run import run as run_suite
-from harness.planning.suite import read_suite
 from harness.results import series_file
 from harness.results.comparison import Incomparable
 from harness.series.executors import on_workers, solve_on_worker
@@ -78,10 +76,6 @@ def once(happened: Callable[[], bool], then: Callable[[], None]) -> Iterator[Non
     yield
     thread.join(timeout=10)
     assert not thread.is_alive()
-
-
-def quiet() -> Console:
-    return Console(file=StringIO(), width=200)
 
 
 def double(k: int) -> int:
@@ -177,11 +171,11 @@ def test_local_workers_keep_the_memory_of_arrays(monkeypatch: pytest.MonkeyPatch
 def test_a_silent_scheduler_keeps_cases(job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.measurement.scheduler.CONNECT_TIMEOUT", "0.3s")
     out = tmp_path / "out"
-    assert run(job, {}, out, quiet()) == 0
+    assert run(job, {}, out, QUIET) == 0
     rows = list(series_file.rows(out))
     more = replace(job, cases=replace(job.cases, count=CASES + 5))  # type: ignore[type-var]
     with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9.*does not answer"):
-        run(more, {}, out, quiet(), "tcp://127.0.0.1:9")
+        run(more, {}, out, QUIET, "tcp://127.0.0.1:9")
     assert list(series_file.rows(out)) == rows
 
 
@@ -251,7 +245,7 @@ def test_a_worker_that_is_killed_costs_no_row(job: Job, tmp_path: Path, cluster:
     out = tmp_path / "out"
     victim = pids(cluster)[0]
     with once(lambda: bool(series_rows(out)), lambda: os.kill(victim, signal.SIGKILL)):
-        assert run(job, {}, out, quiet(), cluster.scheduler_address) == 0
+        assert run(job, {}, out, QUIET, cluster.scheduler_address) == 0
     assert victim not in pids(cluster)
     assert [row["case"] for row in series_file.rows(out)] == list(range(4))
     gaps = series_file.StoredGaps(out, 45)[range(4)]
@@ -267,11 +261,11 @@ def test_a_table_is_solved_on_workers_a_case_each_row(cluster: Any, tmp_path: Pa
     table = measured_gaps(scene, tmp_path / "gaps.npy")
     job = Job(scene=scene, cases=table, form="dual", check=0, threads=1)
     alone, out = tmp_path / "alone", tmp_path / "out"
-    assert run(job, {}, alone, quiet()) == 0
-    assert run(job, {}, out, quiet()) == 0
+    assert run(job, {}, alone, QUIET) == 0
+    assert run(job, {}, out, QUIET) == 0
     with series_file.connected(out) as connection:
         connection.execute("DELETE FROM cases WHERE number % 3 != 1")
-    assert run(job, {}, out, quiet(), cluster.scheduler_address) == 0
+    assert run(job, {}, out, QUIET, cluster.scheduler_address) == 0
     gaps, wanted = (series_file.StoredGaps(each, 45)[range(30)] for each in (out, alone))
     again = [k for k in range(30) if k % 3 != 1]
     np.testing.assert_allclose(gaps[again], wanted[again], atol=1e-7)
@@ -283,7 +277,7 @@ def test_a_measurement_that_kills_its_workers_is_left_and_said(cluster: Any, tmp
     their answers are brought here.
     """
     entries = '[[solver]]\nname = "newton"\n[[solver]]\nname = "exact"\n'
-    suite = read_suite(str(tiny_joint.write_suite(tmp_path, entries)))
+    suite = tiny_joint.suite(tmp_path, entries)
     killer = tiny_joint.EXACT.replace("L = sla", "import os; os.kill(os.getppid(), 9); L = sla")
     (tmp_path / "exact.py").write_text(killer)
     code, said = said_by(

@@ -18,7 +18,7 @@ from harness.measurement.suite_run import run
 from harness.measurement.task import Task
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import HALF_DECADES, Measurement, expand
-from harness.planning.suite import read_suite, suite_from
+from harness.planning.suite import suite_from
 from harness.planning.tolerance_search import (
     START,
     decided_by,
@@ -51,7 +51,7 @@ LOOSE = 2e-5  # mm: found in few steps
 
 def suite_of(folder: Path, limit_mm: float = 1e-7, **changes: Any) -> Any:
     (folder / "rough.py").write_text(ROUGH)
-    suite = read_suite(str(tiny_joint.write_suite(folder, limit_mm=limit_mm)))
+    suite = tiny_joint.suite(folder, limit_mm=limit_mm)
     change = Overrides(solvers=("rough",), tolerances="auto", plugin=folder / "rough.py", **changes)
     return overridden(suite, change)
 
@@ -254,7 +254,7 @@ def test_a_row_is_waited_for_where_it_decides(tmp_path: Path) -> None:
     assert decided_by(replace(first, guide=("another", 3.0, 1.0))) & decides_on(
         replace(first, scene="another", form="dual")
     )
-    (alone,) = expand(read_suite(str(tiny_joint.write_suite(tmp_path))))
+    (alone,) = expand(tiny_joint.suite(tmp_path))
     assert not decided_by(alone)
 
 
@@ -269,7 +269,7 @@ def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str,
 
 @pytest.mark.parametrize(("seconds", "repeats"), [(0.1, 5), (3.0, 3), (30.0, 1)])
 def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float, repeats: int) -> None:
-    suite = read_suite(str(tiny_joint.write_suite(tmp_path))).model_copy(update={"repeats": "auto"})
+    suite = tiny_joint.suite(tmp_path).model_copy(update={"repeats": "auto"})
     plan = [m for m in expand(suite) if m.solver == suite.solver[0].name]
     rows = [row_of(plan[0], seconds)]
     others = [m for m in plan if m.tolerance == plan[0].tolerance and m.form == plan[0].form]
@@ -284,7 +284,7 @@ class Unread(list[Row]):
 
 def test_rows_are_read_only_for_what_they_may_leave_out(tmp_path: Path) -> None:
     """So that a series of many cases resumes in a time that grows with their number, not its square."""
-    (m,) = expand(read_suite(str(tiny_joint.write_suite(tmp_path))))
+    (m,) = expand(tiny_joint.suite(tmp_path))
     assert still_needed(m, Unread()) == m
     with pytest.raises(AssertionError):
         still_needed(expand(suite_of(tmp_path))[0], Unread())
@@ -311,6 +311,6 @@ def test_a_bad_option(tmp_path: Path, option: str) -> None:
 
 
 def test_a_series_searches_for_nothing(tmp_path: Path) -> None:
-    data = read_suite(str(tiny_joint.write_suite(tmp_path))).model_dump(exclude_none=True)
+    data = tiny_joint.suite(tmp_path).model_dump(exclude_none=True)
     data |= {"series": {"cases": 2}, "tolerances": "auto", "repeats": "auto"}
     assert len(refusal_of(suite_from, data, tmp_path / "suite.toml").faults) == 2

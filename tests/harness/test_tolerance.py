@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import StringIO
 from math import inf
@@ -155,6 +155,30 @@ def test_a_directory_holds_the_series_of_one_key(tmp_path: Path) -> None:
     ]
 
 
+#: The figures of a case, by the value, whether the cases are fresh, and its number.
+Figures = Callable[[float, bool, int], dict[str, float]]
+
+
+def known(gap: float) -> dict[str, float]:
+    return {"max_gap_mm": gap, "gap_error_mm": 0.0}
+
+
+@pytest.fixture
+def made_up(monkeypatch: pytest.MonkeyPatch, without_pictures: None) -> Callable[[int, Figures], None]:
+    """Lets each series have so many cases, with made-up figures."""
+
+    def make_up(count: int, figures: Figures) -> None:
+        def rows(folder: Path) -> list[dict[str, float]]:
+            value, fresh = float(folder.name.removesuffix("-fresh")), folder.name.endswith("-fresh")
+            return [{"case": k} | figures(value, fresh, k) for k in range(count)]
+
+        monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
+        monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": count})
+        monkeypatch.setattr(series_file, "rows", rows)
+
+    return make_up
+
+
 def test_bisection_finds_the_limit_and_its_interval() -> None:
     """On drawn shares that change one way, rising and falling, of 2 to 60 values and 1 to 300 cases."""
     random = np.random.default_rng(5)
@@ -180,19 +204,12 @@ def test_bisection_finds_the_limit_and_its_interval() -> None:
         assert len(set(asked)) <= 2 + 3 * np.ceil(np.log2(size + 1))
 
 
-@pytest.mark.usefixtures("without_pictures")
-def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_value_that_fresh_cases_contradict_moves(
+    made_up: Callable[[int, Figures], None], tmp_path: Path
+) -> None:
     """Half-way to the end of its interval where the share is surely kept, until they do not."""
     count = 100
-
-    def rows(folder: Path) -> list[dict[str, float]]:
-        value = float(folder.name.removesuffix("-fresh"))
-        wrong = count * value * (1.5 if folder.name.endswith("-fresh") else 1.0)
-        return [{"case": k, "max_gap_mm": float(k < wrong), "gap_error_mm": 0.0} for k in range(count)]
-
-    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
-    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": count})
-    monkeypatch.setattr(series_file, "rows", rows)
+    made_up(count, lambda value, fresh, k: known(float(k < count * value * (1.5 if fresh else 1.0))))
     found = tolerance(write_strip(tmp_path), tmp_path / "out", f"{SD}=0.01:0.61", 0.5, 0.7, 1 / 60)
     ends = np.array([interval_of(kept, count) for kept in range(count + 1)])
     sure, possible = (ends >= 0.7).argmax(axis=0)  # the fewest cases that do not exclude the share
@@ -205,20 +222,9 @@ def test_a_value_that_fresh_cases_contradict_moves(monkeypatch: pytest.MonkeyPat
     assert "](shares.png)" in (tmp_path / "out/report.md").read_text()
 
 
-@pytest.mark.usefixtures("without_pictures")
-def test_cases_without_an_answer_are_counted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_cases_without_an_answer_are_counted(made_up: Callable[[int, Figures], None], tmp_path: Path) -> None:
     """In each line, in the outcome and in the table; they keep no limit, and are not known to exceed it."""
-
-    def rows(folder: Path) -> list[dict[str, float]]:
-        value = float(folder.name.removesuffix("-fresh"))
-        return [
-            {"case": 0},
-            *({"case": k, "max_gap_mm": k * value, "gap_error_mm": 0.0} for k in range(1, 10)),
-        ]
-
-    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
-    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": 10})
-    monkeypatch.setattr(series_file, "rows", rows)
+    made_up(10, lambda value, _, k: known(k * value) if k else {})
     said = StringIO()
     asked = f"{SD}=0.1:0.5", 1.0, 0.5, 0.5
     found = tolerance(write_strip(tmp_path), tmp_path / "out", *asked, reporter=onto(said))
@@ -231,40 +237,26 @@ def test_cases_without_an_answer_are_counted(monkeypatch: pytest.MonkeyPatch, tm
     np.testing.assert_allclose((low, high), (low * 0 + interval_of(9, 10)[0], low * 0 + 1.0), rtol=1e-9)
 
 
-@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("figures", [{}, {"max_gap_mm": 0.5}], ids=["no answer", "no error known"])
 def test_where_nothing_is_known_at_both_ends_nothing_is_judged(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, figures: dict[str, float]
+    made_up: Callable[[int, Figures], None], tmp_path: Path, figures: dict[str, float]
 ) -> None:
     """The key is not to blame."""
-    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
-    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": 2})
-    monkeypatch.setattr(series_file, "rows", lambda _: [{"case": k} | figures for k in (0, 1)])
+    made_up(2, lambda *_: figures)
     words = "--key", SD, "--range", "0.1:0.2", "--allow-gap", 1.0, "--cases", 2
     done = harness("tolerance", write_strip(tmp_path), *words, "--out", tmp_path / "out")
     assert done.exit_code == 3
     assert "cannot be judged: of 2 and 2 cases it is not known" in " ".join(done.output.split())
 
 
-@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(("kept", "passed"), [(6, True), (4, None)])
 def test_fresh_cases_that_are_not_known_decide_nothing(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kept: int, passed: bool | None
+    made_up: Callable[[int, Figures], None], tmp_path: Path, kept: int, passed: bool | None
 ) -> None:
     """Of 20 fresh cases 6 are known to keep it, or 4 with the rest unknown: 6 reach a share of a half."""
     assert share_interval(6, 20)[1] >= 0.5 > share_interval(4, 20)[1]
-
-    def rows(folder: Path) -> list[dict[str, float]]:
-        if not folder.name.endswith("-fresh"):
-            gap = float(folder.name)
-            return [{"case": k, "max_gap_mm": gap, "gap_error_mm": 0.0} for k in range(20)]
-        return [
-            {"case": k, "max_gap_mm": 0.1} | ({"gap_error_mm": 0.0} if k < kept else {}) for k in range(20)
-        ]
-
-    monkeypatch.setattr(limit_search, "run_series", lambda *_, **__: None)
-    monkeypatch.setattr(series_file, "read_facts", lambda _: {"cases": 20})
-    monkeypatch.setattr(series_file, "rows", rows)
+    only_gap = {"max_gap_mm": 0.1}
+    made_up(20, lambda value, new, k: only_gap if new and k >= kept else known(0.1 if new else value))
     found = tolerance(write_strip(tmp_path), tmp_path / "out", f"{SD}=0.1:0.5", 0.3, 0.5, 0.5)
     assert (found.value, found.passed) == (0.3, passed)
     assert ("cannot be judged" in found.sentences[-1]) == (passed is None)

@@ -1,20 +1,18 @@
 """`run --with NAME==VERSION`: versions of a library, each in an environment of its own; no network."""
 
 import zipfile
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 import tiny_joint
 from commands import harness
-from rich.console import Console
+from suite_runs import rows_of, said_by
 
 from harness.measurement.environments import COMPLETE
 from harness.measurement.suite_run import run as measure
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.suite import read_suite
-from harness.results import records
 from problems import storage
 
 pytestmark = pytest.mark.slow
@@ -60,16 +58,14 @@ def _offline(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def run(folder: Path, out: Path, *versions: str) -> tuple[str, dict[str, dict[str, Any]]]:
     """What is printed, and the rows by their version."""
     asked = tuple(f"fakelib=={version}" for version in versions)
-    suite = overridden(
-        read_suite(str(folder / "small.toml")), Overrides(solvers=("fake",), requirements=asked)
-    )
-    console = Console(file=StringIO(), width=200)
-    assert measure(suite, out, console) == 0
-    return console.file.getvalue(), by_version(out)  # type: ignore[attr-defined]
+    change = Overrides(solvers=("fake",), requirements=asked)
+    code, text = said_by(measure, overridden(read_suite(str(folder / "small.toml")), change), out)
+    assert code == 0
+    return text, by_version(out)
 
 
 def by_version(out: Path) -> dict[str, dict[str, Any]]:
-    rows = records.read(out / records.MEASUREMENTS)
+    rows = rows_of(out)
     assert len({row["key"] for row in rows}) == len(rows)
     return {row["solver_version"].removeprefix("fakelib=="): row for row in rows}
 
