@@ -63,7 +63,7 @@ class Told(Reporter):
 def study_of(path: Path, cases: int = 6) -> FastenerStudy:
     movable = MovableFasteners.of(read_scene(str(path)))
     gaps = random_gaps(movable.bare, cases, 0)
-    return FastenerStudy(movable.bare, gaps, "dual", movable)
+    return FastenerStudy.of(movable, gaps, "dual")
 
 
 def plans_of(path: Path, rows: int, columns: int) -> Plan:
@@ -551,7 +551,7 @@ def test_workers_get_the_rows_of_their_question(
     movable, sent = MovableFasteners.of(read_scene(str(strip))), list[np.ndarray]()
     law = random_gaps(movable.bare, 6, 0)
     gaps = np.array([law.load(k).g for k in range(6)])
-    study = FastenerStudy(movable.bare, MeasuredGaps(law.load(0), gaps, 6), "dual", movable)
+    study = FastenerStudy.of(movable, MeasuredGaps(law.load(0), gaps, 6), "dual")
     questions = [Question((((33.0, 12.5),),), cases) for cases in ((0, 1), (4,))]
 
     def on_worker(task: Any) -> list[Outcome]:
@@ -785,7 +785,7 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
     movable = MovableFasteners.of(read_scene(str(path)))
-    study = FastenerStudy(movable.bare, Listed((load_case(movable.bare),)), "dual", movable)
+    study = FastenerStudy.of(movable, Listed((load_case(movable.bare),)), "dual")
     (found,) = PlanSession(study).answer(Question((movable.current,), (0,)))
     assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)
 

@@ -144,7 +144,7 @@ def test_searches_draw_what_a_series_draws(scene: Path, tmp_path: Path) -> None:
     rows, read = rows_of(tmp_path / "series"), read_scene(str(scene))
     assert isinstance(read, JointScene)
     cases = GapCases(count=3).of_search(read, "dual")
-    session = PlanSession(ShimStudy(read, cases, "dual", patches_of(read.joint, "1x1"), (1e9, inf), read))
+    session = PlanSession(ShimStudy(read, read, cases, "dual", patches_of(read.joint, "1x1"), (1e9, inf)))
     (outcome,) = session.answer(Question(((),), (0, 1, 2)))
     assert outcome.largest == pytest.approx([row["max_gap_mm"] for row in rows], abs=1e-7)
     forces = [max(np.ravel(row["fasteners.preload"])) for row in rows]
@@ -152,7 +152,7 @@ def test_searches_draw_what_a_series_draws(scene: Path, tmp_path: Path) -> None:
     pressed = replace(read, random=("pressure.value=uniform(0, 2e-4)",))
     movable = MovableFasteners.of(pressed)
     cases = GapCases(count=3).of_search(movable.scene, "dual")
-    (placed,) = PlanSession(FastenerStudy(movable.bare, cases, "dual", movable)).answer(
+    (placed,) = PlanSession(FastenerStudy.of(movable, cases, "dual")).answer(
         Question((movable.current,), (0, 1, 2))
     )
     for k, largest in enumerate(placed.largest):

@@ -519,7 +519,7 @@ def test_two_shims_change_together_where_one_alone_does_not_help(
     path.write_text("\n".join([two_parts(length=155.0, width=77.9, nodes=(13, 4)), *effects]))
     scene = scene_at(path)
     patches = patches_of(scene.joint, "5x1")
-    session = PlanSession(ShimStudy(scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf), scene))
+    session = PlanSession(ShimStudy(scene, scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf)))
     search = search_of(session, 0.0255, (0.038, 0.056, 0.06))
     _, together = search.once(())
     monkeypatch.setattr(ShimSearch, "walked", lambda *_: ((), False))
@@ -612,7 +612,7 @@ def test_contacts_on_a_line_have_the_areas_of_the_first_face(tmp_path: Path) -> 
     fasteners = {"kind": "fasteners", "preload": 1.0, "points": [[200.0, 60.0]]}
     scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.2}, fasteners)
     cases, patches = Listed((load_case(scene),)), patches_of(scene.joint, "2x1")
-    study = ShimStudy(scene, cases, "dual", patches, (inf, inf), scene)
+    study = ShimStudy(scene, scene, cases, "dual", patches, (inf, inf))
     np.testing.assert_allclose(study.areas, [375.0, *[750.0] * 7, 375.0])
     (outcome,) = PlanSession(study).answer(Question((((0, 0.1),),), (0,)))
     assert 0 < sum(outcome.further[0][3:6]) < 0.2 * study.areas.sum()

@@ -178,8 +178,8 @@ def test_searches_draw_what_a_series_draws(tmp_path: Path) -> None:
     movable, patches = MovableFasteners.of(scene), patches_of(scene.joint, "1x1")
     job = job_of(scene, {name: law for name, law in LAWS.items() if not name.startswith("fasteners")})
     rows = [row for row, _ in results_of(job).values()]
-    shims = ShimStudy(last_scene(scene), job.cases, "dual", patches, (1e9, np.inf), scene)
-    tacks = FastenerStudy(movable.bare, job.cases, "dual", movable)
+    shims = ShimStudy(scene, last_scene(scene), job.cases, "dual", patches, (1e9, np.inf))
+    tacks = FastenerStudy.of(movable, job.cases, "dual")
     for study, plan in ((tacks, movable.current), (shims, ())):
         (outcome,) = PlanSession(study).answer(Question((plan,), (0, 1)))  # type: ignore[arg-type]
         assert outcome.largest == pytest.approx([row["max_gap_mm"] for row in rows], abs=2e-7)
