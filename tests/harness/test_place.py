@@ -38,7 +38,6 @@ from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.build import load_case
 from problems.errors import InputError
 from problems.input.tables import TableOptions
-from problems.load_cases import Listed
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
 from problems.reporter import Reporter
@@ -157,11 +156,6 @@ def test_fewest_are_near_optimum(strip: Path, session: PlanSession) -> None:
         best, _ = search.fewest(search.whole(candidates))
         assert search.whole(best.plan).gap_mm == best.gap_mm <= limit
         assert optimum <= len(best.plan) <= optimum + 1
-
-
-def test_the_gap_is_that_of_the_share(session: PlanSession) -> None:
-    search = replace(searched(session, 0.0, ()), cases=5, allowed=1)
-    assert search.gap(Outcome((0.1, 0.5, 0.3, 0.2, 0.0), (0,) * 5, (0.0,) * 5)) == 0.3
 
 
 def test_lazy_removal_asks_less(strip: Path, session: PlanSession, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -434,11 +428,6 @@ def test_exchange_starts_from_what_is_least_in_all_cases(strip: Path) -> None:
     )
     found, _ = search.fewer(search.whole(candidates[:2]), {})
     assert found.gap_mm == 0.5
-
-
-def test_a_plan_moves_onto_the_nearest_free_holes() -> None:
-    holes = ((0.0, 0.0), (10.0, 0.0), (20.0, 0.0), (30.0, 0.0))
-    assert search_module.onto(((9.0, 5.0), (11.0, 0.0)), holes) == holes[1:3]
 
 
 def place(path: Path, out: Path, *words: object) -> Any:
@@ -763,14 +752,6 @@ def test_a_law_of_gaps_is_written_among_effects_of_any_shape(tmp_path: Path, tex
     assert (second.kind, second.mean, second.random.sd) == ("initial_gap", 0.3, 0.1)
 
 
-def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:
-    plan = tmp_path / "plan.toml"
-    plan.write_text(strip.read_text())
-    told = wrong_usage("place", plan, "--count", 2, "--out", tmp_path)
-    assert "is one of the files that are read: name another" in told
-    assert [each.name for each in tmp_path.iterdir()] == ["plan.toml"]
-
-
 def test_fasteners_in_the_file_of_the_assembly_are_refused_before_the_search(tmp_path: Path) -> None:
     joint = two_parts().replace("[joint]", "").replace("joint.part", "part")
     (tmp_path / "joint.toml").write_text(joint + FASTENERS)
@@ -779,15 +760,6 @@ def test_fasteners_in_the_file_of_the_assembly_are_refused_before_the_search(tmp
     told = wrong_usage("place", scene, "--count", 2, "--cases", 6, "--share", 1, "--out", tmp_path / "out")
     assert "joint.toml: effect = ['fasteners']: these in the scene itself" in told
     assert not (tmp_path / "out").exists()
-
-
-def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
-    movable = MovableFasteners.of(read_scene(str(path)))
-    study = FastenerStudy.of(movable, Listed((load_case(movable.bare),)), "dual")
-    (found,) = PlanSession(study).answer(Question((movable.current,), (0,)))
-    assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)
 
 
 @pytest.mark.parametrize("command", ["place", "shim"])

@@ -1,6 +1,7 @@
 """Which shims close the gap: plans against other answers and full enumeration; refused, resumed, drawn."""
 
 import json
+from collections import Counter
 from dataclasses import replace
 from hashlib import sha256
 from itertools import product
@@ -19,7 +20,6 @@ from small_joints import FASTENERS, GAP, INLINE, JOINT, PART, make_joint, scene_
 from superelements import flat, scene_from, write_part
 
 from harness import solve
-from harness.placement.answer_journal import AnswerJournal
 from harness.placement.fresh_cases import Goal, Sample, SearchOutcome
 from harness.placement.plan_search import Step
 from harness.placement.session import Outcome, PlanSession, Question
@@ -84,18 +84,6 @@ def test_a_plan_leaves_what_a_scene_with_its_shims_leaves(strip: Path) -> None:
     np.testing.assert_allclose(estimated.further, outcome.further, rtol=1e-3)
     assert sum(outcome.further[0][9:18]) == pytest.approx(np.maximum(answer.gap, 0) @ study.areas, rel=1e-6)
     assert study.areas.sum() == pytest.approx(200.0 * 50.0)
-
-
-def test_a_shim_over_all_contacts_is_a_smaller_gap(strip: Path) -> None:
-    """To the last bit, at thicknesses that binary numbers hold."""
-    scene = scene_at(strip)
-    gap = next(effect for effect in scene.effects if effect.kind == "initial_gap")
-    flat = [gap.model_copy(update={"mean": mean, "random": None}) for mean in (0.5, 0.25)]
-    rest = [effect for effect in scene.effects if effect is not gap]
-    sheet = Shims(kind="shims", thickness=0.25, x=(0.0, 200.0), y=(0.0, 50.0))
-    shimmed, smaller = (replace(scene, effects=(*rest, *some)) for some in ([flat[0], sheet], [flat[1]]))
-    assert load_case(shimmed).g.tobytes() == load_case(smaller).g.tobytes()
-    assert solve(shimmed).gap.tobytes() == solve(smaller).gap.tobytes()
 
 
 @pytest.mark.parametrize(("patches", "share"), [("4x1", 0.7), ("2x2", 0.35)])
@@ -211,16 +199,6 @@ def test_patches_of_a_gap_need_shims_that_change_nothing_else(strip: Path) -> No
     assert patches_of_gap(joint, answer.gap, answer.gap.max()) == ()
 
 
-def test_what_could_not_be_read_is_refused_before_the_search(
-    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("harness.shimming.shim_run.edited", lambda *_: "joint = 1\n")
-    done = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1)
-    assert done.exit_code == 2
-    assert "shimmed.toml: joint = 1" in done.output
-    assert not (tmp_path / "out" / "shims.jsonl").exists()
-
-
 def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path, tmp_path: Path) -> None:
     """The scene alone could: an effect has the name that shims have without one."""
     scene = tmp_path / "scene.toml"
@@ -273,42 +251,39 @@ def test_a_region_is_divided_where_its_parts_differ_least(strip: Path) -> None:
     assert ends == [(0.0, 45.0), (45.0, 65.0), (155.0, 200.0)]
 
 
+@pytest.mark.parametrize(
+    ("ends", "patches", "limit", "words"),
+    [
+        (1, "4x1", 0.08, ("--stock", "0.02,0.04,0.08", "--mean", 0.08)),
+        (2, "2x1", 0.03, ("--stock", "0.02,0.05", "--mean", 0.05, "--taper")),
+    ],
+)
 def test_each_joint_has_shims_of_its_own(
-    strip: Path, study: ShimStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    strip: Path, tmp_path: Path, ends: int, patches: str, limit: float, words: tuple[Any, ...]
 ) -> None:
-    """What `solve` says of each of them with its shims; the same after an interruption; the stock adds up."""
-    words, keep, kept = ("--each", "--cases", 3, "--share", 1, "--mean", 0.08), AnswerJournal._keep, [0]
-
-    def interrupted(self: AnswerJournal, *answer: Any) -> None:
-        keep(self, *answer)
-        kept[0] += 1
-        if kept[0] == 2:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr("report.writers.shim_report.write", Path)  # slow
-        patch.setattr(AnswerJournal, "_keep", interrupted)
-        assert shim(strip, tmp_path / "parts", *words).exit_code == 130
-        patch.setattr(AnswerJournal, "_keep", keep)
-        assert shim(strip, tmp_path / "parts", *words).exit_code in (0, 4)
-    done = shim(strip, tmp_path / "whole", *words)
+    """What `solve` says of each of them with its shims; the stock adds up, tapered pieces from the thin end."""
+    path, out = tmp_path / "scene.toml", tmp_path / "out"
+    path.write_text(strip.read_text().removesuffix(RIVET if ends == 2 else ""))
+    asked = ("--allow-gap", limit, "--patches", patches, *words, "--each", "--cases", 3, "--share", 1)
+    done = harness("shim", path, *asked, "--out", out)
+    assert done.exit_code in (0, 4), done.output
     assert "of 3 joints can be kept within the limits" in done.output
-    record = record_of(tmp_path / "whole")
-    assert record["joints"] == record_of(tmp_path / "parts")["joints"]
-    scene = scene_at(strip)
-    cases, pieces = GapCases(count=3, mean=0.08).of(scene, "dual"), 0
-    for joint, line in zip(
-        record["joints"], pd.read_csv(tmp_path / "whole" / "joints.csv").iloc, strict=True
-    ):
-        effects = [effect for effect in scene.effects if effect.kind != "initial_gap"]
-        effects += [study.effect(item) for item in joint["plan"]]
-        load = cases.load(joint["joint"])
-        gap = solve(with_gap(replace(scene, effects=tuple(effects)), load.g)).gap.max()
-        assert (gap <= 0.08) == joint["kept"] == line["kept"]
-        pieces += len(joint["plan"])
-    stock = pd.read_csv(tmp_path / "whole" / "stock.csv")
-    assert stock["pieces"].sum() == pieces > 0
-    assert set(stock["thickness_mm"]) <= set(STOCK)
+    scene, study = scene_at(path), study_of(path, patches, ends=ends)
+    cases, joints = GapCases(count=3, mean=words[3]).of(scene, "dual"), pd.read_csv(out / "joints.csv")
+    pieces = list[tuple[float, ...]]()
+    for k, joint in enumerate(record_of(out)["joints"]):
+        shims = [study.effect(tuple(item)) for item in joint["plan"]]
+        effects = (*(effect for effect in scene.effects if effect.kind != "initial_gap"), *shims)
+        gap = solve(with_gap(replace(scene, effects=effects), cases.load(k).g)).gap.max()
+        assert (gap <= limit) == joint["kept"] == joints["kept"][k]
+        for patch, *t in joint["plan"]:
+            name = study.patches[int(patch)].name
+            assert [joints[f"{name}{end}"][k] for end in ("", ", other end")[:ends]] == t
+            pieces.append(tuple(sorted(t)))
+    stock = pd.read_csv(out / "stock.csv")
+    sizes = stock.filter(like="thickness").itertuples(index=False, name=None)
+    assert dict(zip(sizes, stock["pieces"], strict=True)) == Counter(pieces)
+    assert pieces
 
 
 @pytest.mark.parametrize(
@@ -392,18 +367,27 @@ def test_the_command_finds_shims_that_solve_confirms(
 
 
 @pytest.mark.usefixtures("without_report")
-def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
-    """Whose gap is as given."""
-    path = tmp_path / "flat.toml"
+@pytest.mark.parametrize(
+    ("mean", "limit", "words"),
+    [
+        (0.2, 0.08, ("--stock", "0.02,0.04,0.08", "--patches", "4x1")),
+        (0.05, 0.04, ("--stock", "0.01,0.02,0.04", "--patches", "3x1", "--taper")),
+    ],
+)
+def test_solve_says_the_same_of_one_joint(
+    strip: Path, tmp_path: Path, mean: float, limit: float, words: tuple[str, ...]
+) -> None:
+    """Whose gap is as given; a tapered shim is written with both ends."""
+    path, out = tmp_path / "flat.toml", tmp_path / "out"
     path.write_text(
-        strip.read_text().replace("random = {", "# random = {").replace("mean = 0.05", "mean = 0.2")
+        strip.read_text().replace("random = {", "# random = {").replace("mean = 0.05", f"mean = {mean}")
     )
-    done = shim(path, tmp_path / "out")
-    assert done.exit_code in (0, 4)
-    record = record_of(tmp_path / "out")
-    largest = solve(str(tmp_path / "out" / "shimmed.toml")).gap.max()
+    done = harness("shim", path, "--allow-gap", limit, *words, "--out", out)
+    assert done.exit_code in (0, 4), done.output
+    record, largest = record_of(out), solve(str(out / "shimmed.toml")).gap.max()
     assert f"{record['after']['gap']:.9f}" == f"{largest:.9f}"
-    assert (done.exit_code == 0) == (largest <= 0.08)
+    assert (done.exit_code == 0) == (largest <= limit)
+    assert all(("thickness_end_mm" in patch) == ("--taper" in words) for patch in record["patches"])
 
 
 @pytest.mark.parametrize(
@@ -504,28 +488,6 @@ def test_a_stock_that_is_too_thin_says_where(strip: Path, tmp_path: Path) -> Non
     assert done.exit_code == 4
     for text in ("FAIL: no shims of the stock", "in patch"):
         assert text in done.output
-
-
-def test_two_shims_change_together_where_one_alone_does_not_help(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    gap = "mean = 0.072\nrandom = { sd = 0.0292, correlation_length = 93.6, seed = 12 }"
-    points = "preload = 117.0\npoints = [[25.5, 63.2], [131.0, 5.19]]"
-    effects = [
-        f'[[effect]]\nkind = "{kind}"\n{text}\n'
-        for kind, text in (("initial_gap", gap), ("fasteners", points))
-    ]
-    path = tmp_path / "joint.toml"
-    path.write_text("\n".join([two_parts(length=155.0, width=77.9, nodes=(13, 4)), *effects]))
-    scene = scene_at(path)
-    patches = patches_of(scene.joint, "5x1")
-    session = PlanSession(ShimStudy(scene, scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf)))
-    search = search_of(session, 0.0255, (0.038, 0.056, 0.06))
-    _, together = search.once(())
-    monkeypatch.setattr(ShimSearch, "walked", lambda *_: ((), False))
-    _, alone = search.once(())
-    assert together.gap_mm <= 0.0255
-    assert search.cost(together.plan) < search.cost(alone.plan)
 
 
 class FewFigures(ShimSearch):
