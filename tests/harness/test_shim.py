@@ -44,7 +44,9 @@ from report.writers import shim_report
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
 RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
+SHEET = '[[effect]]\nkind = "shims"\nthickness = 0.02\nx = [50.0, 100.0]\ny = [0.0, 50.0]\n'
 STOCK = (0.02, 0.04, 0.08)
+ASKED = ("--allow-gap", 0.08, "--stock", "0.02,0.04,0.08", "--patches", "4x1")
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +63,7 @@ def study(strip: Path) -> ShimStudy:
 
 
 def shim(path: Path, out: Path, *words: object) -> Any:
-    stock = ("--allow-gap", 0.08, "--stock", "0.02,0.04,0.08", "--patches", "4x1")
-    return harness("shim", path, *stock, "--out", out, *words)
+    return harness("shim", path, *ASKED, "--out", out, *words)
 
 
 def record_of(directory: Path) -> dict[str, Any]:
@@ -199,15 +200,23 @@ def test_patches_of_a_gap_need_shims_that_change_nothing_else(strip: Path) -> No
     assert patches_of_gap(joint, answer.gap, answer.gap.max()) == ()
 
 
-def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path, tmp_path: Path) -> None:
-    """The scene alone could: an effect has the name that shims have without one."""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(strip.read_text().replace('"initial_gap"', '"initial_gap"\nname = "shims"'))
-    read_scene(str(scene))
-    done = shim(scene, tmp_path / "out", "--cases", 2, "--share", 1)
-    assert done.exit_code == 2
-    assert "another name: that of a kind" in " ".join(done.output.split())
-    assert not (tmp_path / "out" / "shims.jsonl").exists()
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (FASTENERS + RIVET, "", ["no fasteners"]),
+        (RIVET, RIVET + SHEET, ["--patches: 1, outline", "both fill the contact at 50, 0 mm"]),
+        ('"initial_gap"', '"initial_gap"\nname = "shims"', ["another name: that of a kind"]),
+    ],
+)
+def test_a_scene_that_shims_do_not_fit_is_refused_before_the_search(
+    strip: Path, tmp_path: Path, old: str, new: str, said: list[str]
+) -> None:
+    """Contacts on a border would be filled twice; an effect has the name that shims have by default."""
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene.write_text(strip.read_text().replace(old, new))
+    told = wrong_usage("shim", scene, *ASKED, "--cases", 2, "--share", 1, "--out", out)
+    assert all(text in told for text in said)
+    assert not (out / "shims.jsonl").exists()
 
 
 @pytest.mark.usefixtures("without_report")
@@ -261,7 +270,7 @@ def test_a_region_is_divided_where_its_parts_differ_least(strip: Path) -> None:
 def test_each_joint_has_shims_of_its_own(
     strip: Path, tmp_path: Path, ends: int, patches: str, limit: float, words: tuple[Any, ...]
 ) -> None:
-    """What `solve` says of each of them with its shims; the stock adds up, tapered pieces from the thin end."""
+    """What `solve` says of each with its shims; the stock adds up, tapered pieces from the thin end."""
     path, out = tmp_path / "scene.toml", tmp_path / "out"
     path.write_text(strip.read_text().removesuffix(RIVET if ends == 2 else ""))
     asked = ("--allow-gap", limit, "--patches", patches, *words, "--each", "--cases", 3, "--share", 1)
@@ -314,21 +323,8 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
 def test_stocks_are_lists_or_steps() -> None:
     assert stock_of("0.2,0.3,0.5") == (0.2, 0.3, 0.5)
     assert stock_of("0.05:0.2:0.05") == (0.05, 0.1, 0.15, 0.2)
-    wrong = [
-        "0",
-        "-0.1,0.2",
-        "0.3,0.2",
-        "0.2,0.2",
-        "nan",
-        "0.1:0.5",
-        "0.1:0.5:0",
-        "0.5:0.1:0.1",
-        "x",
-        "inf",
-        "1e16",
-    ]
-    none: Any = ["", [0.1, 0.2], 0.1, *wrong]
-    for text in none:
+    wrong: Any = "0 -0.1,0.2 0.3,0.2 0.2,0.2 nan 0.1:0.5 0.1:0.5:0 0.5:0.1:0.1 x inf 1e16".split()
+    for text in [*wrong, "", [0.1, 0.2], 0.1]:
         with pytest.raises(InputError, match="ascending"):
             stock_of(text)
 
@@ -433,21 +429,8 @@ def test_a_limit_on_a_stress_that_no_place_tells_is_refused(
 ) -> None:
     """Before the search, in which no plan could keep it."""
     monkeypatch.setattr("harness.shimming.shim_run.none_told", lambda _: True)
-    done = shim(strip, tmp_path / "out", "--allow-stress", 50)
-    assert done.exit_code == 2
-    assert "left out: forces at points act near all elements" in " ".join(done.output.split())
-
-
-def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path: Path) -> None:
-    """The contacts on the border of both would be filled twice."""
-    shimmed = tmp_path / "shimmed.toml"
-    rectangle = '[[effect]]\nkind = "shims"\nthickness = 0.02\nx = [50.0, 100.0]\ny = [0.0, 50.0]\n'
-    shimmed.write_text(strip.read_text() + rectangle)
-    done = shim(shimmed, tmp_path / "out")
-    assert done.exit_code == 2
-    assert "--patches: 1, outline" in done.output
-    assert "both fill the contact at 50, 0 mm" in " ".join(done.output.split())
-    assert not (tmp_path / "out").exists()
+    told = wrong_usage("shim", strip, *ASKED, "--allow-stress", 50, "--out", tmp_path / "out")
+    assert "left out: forces at points act near all elements" in told
 
 
 def test_a_directory_of_another_command_is_refused_before_patches_are_found(
@@ -455,32 +438,19 @@ def test_a_directory_of_another_command_is_refused_before_patches_are_found(
 ) -> None:
     monkeypatch.setattr("harness.shimming.shim_run.PlanSession", lambda _: pytest.fail("solved"))
     (tmp_path / "plans.jsonl").touch()
-    asked = ("--allow-gap", 0.1, "--stock", "0.1", "--cases", 2, "--share", 1)
-    told = wrong_usage("shim", strip, *asked, "--out", tmp_path)
+    told = wrong_usage("shim", strip, "--allow-gap", 0.1, "--stock", "0.1", "--out", tmp_path)
     assert "has plans.jsonl of another command" in told
 
 
 @pytest.mark.usefixtures("without_report")
-@pytest.mark.parametrize(("command", "row"), [("shim", 2), ("place", 0)])
-def test_no_answer_of_a_table_that_has_changed_is_used(
-    strip: Path, tmp_path: Path, command: str, row: int
-) -> None:
-    gaps, where = np.full((3, 84), 0.05), ("--gaps", tmp_path / "gaps.npy", "--share", 1)
-    how = ("--out", tmp_path / "out", "--allow-gap", 0.1, *where)
-    how += ("--stock", 0.1) if command == "shim" else ("--candidates", "3x1")
-    np.save(tmp_path / "gaps.npy", gaps)
-    assert harness(command, strip, *how).exit_code in (0, 4)
-    gaps[row] = 2.0
-    np.save(tmp_path / "gaps.npy", gaps)
-    assert "cases_key" in wrong_usage(command, strip, *how)
-
-
-def test_a_scene_without_fasteners_is_refused(strip: Path, tmp_path: Path) -> None:
-    bare = tmp_path / "bare.toml"
-    bare.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.1\n')
-    done = shim(bare, tmp_path / "out")
-    assert done.exit_code == 2
-    assert "no fasteners" in done.output
+def test_no_answer_of_a_table_that_has_changed_is_used(strip: Path, tmp_path: Path) -> None:
+    gaps, table = np.full((3, 84), 0.05), tmp_path / "gaps.npy"
+    asked = ("--allow-gap", 0.1, "--stock", 0.1, "--gaps", table, "--share", 1, "--out", tmp_path / "out")
+    np.save(table, gaps)
+    assert harness("shim", strip, *asked).exit_code in (0, 4)
+    gaps[2] = 2.0
+    np.save(table, gaps)
+    assert "cases_key" in wrong_usage("shim", strip, *asked)
 
 
 def test_a_stock_that_is_too_thin_says_where(strip: Path, tmp_path: Path) -> None:
