@@ -1,6 +1,5 @@
 """A series with random keys: its rows, the scene's own table, resumption, and searches that draw the same."""
 
-from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -11,8 +10,7 @@ from refusals import refusal_of
 from strip_scene import STRIP
 
 from harness import shim
-from harness.placement.candidates import MovableFasteners
-from harness.placement.session import FastenerStudy, PlanSession, Question
+from harness.placement.session import PlanSession, Question
 from harness.results import series_file
 from harness.scene.solution import solve
 from harness.series.derivatives import derivatives
@@ -149,17 +147,6 @@ def test_searches_draw_what_a_series_draws(scene: Path, tmp_path: Path) -> None:
     assert outcome.largest == pytest.approx([row["max_gap_mm"] for row in rows], abs=1e-7)
     forces = [max(np.ravel(row["fasteners.preload"])) for row in rows]
     assert [figures[-2] for figures in outcome.further] == pytest.approx(forces)
-    pressed = replace(read, random=("pressure.value=uniform(0, 2e-4)",))
-    movable = MovableFasteners.of(pressed)
-    cases = GapCases(count=3).of_search(movable.scene, "dual")
-    (placed,) = PlanSession(FastenerStudy.of(movable, cases, "dual")).answer(
-        Question((movable.current,), (0, 1, 2))
-    )
-    for k, largest in enumerate(placed.largest):
-        drawn = cases.parameters(k)
-        text = scene.read_text().replace("1e-4\n", f"{drawn['pressure.value']!r}\n")
-        (tmp_path / "drawn.toml").write_text(text.replace("seed = 7", f"seed = {drawn['gap_seed']}"))
-        assert largest == pytest.approx(solve(tmp_path / "drawn.toml").gap.max(), abs=1e-7)
 
 
 def test_what_searches_cannot_draw_is_refused(scene: Path, tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """Plans of fasteners that stages set and take out: the gap after the last stage, against `solve`."""
 
 import json
-import pickle
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -14,7 +13,7 @@ from small_joints import STAGED, scene_at
 
 from harness import solve
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, without_fasteners
-from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question, answer
+from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question
 from harness.results import series_file
 from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.errors import InputError
@@ -129,15 +128,6 @@ def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
         assert rows[k]["max_gap_mm"] <= gaps[best] + 2e-7
         assert list(rows[k]["stages_max_gap_mm"]) == record["stages"]
     assert "after stage release" in (out / "report" / "report.md").read_text()
-
-
-def test_a_worker_answers_the_same(path: Path) -> None:
-    """It is sent the study with the cases of the question alone, and opens the stages anew."""
-    movable = MovableFasteners.of(scene_at(path))
-    study = FastenerStudy.of(movable, random_gaps(movable.bare, CASES, 0), "dual")
-    question = Question((movable.current, ()), (1,))
-    task = replace(study, cases=study.cases.only(question.cases)), question
-    assert answer(pickle.loads(pickle.dumps(task))) == PlanSession(study).answer(question)
 
 
 def test_a_plan_without_fasteners_has_stages_without_them(path: Path, tmp_path: Path) -> None:
