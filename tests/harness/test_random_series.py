@@ -64,17 +64,6 @@ def test_the_table_of_a_scene_and_its_options_are_drawn(scene: Path, tmp_path: P
     [
         (("--random", "ribs.I=uniform(60, 20)"), "N of DISTRIBUTION: it changes K"),
         (("--random", "pressure.value=norm()", "--sweep", "initial_gap.mean=1,2"), "random gaps, --gaps or"),
-        (
-            (
-                "--random",
-                "initial_gap.random.sd=uniform(0.1, 0.1)",
-                "--sd",
-                "0.2",
-                "--correlation-length",
-                "90",
-            ),
-            "--sd: mm = 0.2: left out: initial_gap.random.sd is random",
-        ),
     ],
 )
 def test_bad_random_keys_are_refused(

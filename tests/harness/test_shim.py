@@ -393,14 +393,7 @@ def test_solve_says_the_same_of_one_joint(
         (("--patches", "0x4"), ["--patches", "columns x rows"]),
         (
             ("--patches", "patches.csv"),
-            [
-                "line 2",
-                "on the junction",
-                "line 3",
-                "overlaps line 2",
-                "x_min < x_max",
-                "(9.0, 0.0), (9.0, 1.0)",
-            ],
+            ["on the junction", "line 3", "overlaps line 2", "x_min < x_max", "(9.0, 0.0), (9.0, 1.0)"],
         ),
         (("--patches", "outlines.csv"), ["line 2, outline", "two of its edges cross", "a name of its own"]),
         (("--patches", "borders.csv"), ["columns x_min, x_max, y_min, y_max, once each"]),
