@@ -43,8 +43,8 @@ class MovableFasteners:
 
     @classmethod
     def of(cls, scene: Scene) -> "MovableFasteners":
-        """Raises InputError as `movable_fasteners` does, if two are at one place, or if a stage has only some
-        of them, or names them by their numbers.
+        """Raises InputError as `movable_fasteners` does, or if a stage has only some of them, or names them by
+        their numbers.
         """
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
@@ -57,8 +57,6 @@ class MovableFasteners:
             allowed = "its name alone: a plan may have another number of points"
             raise InputError.one(f"scene {scene.name}", "fasteners in stages", parts, allowed)
         marks = np.concatenate([each.marks(scene.joint) for each in fasteners])
-        if twice := _twice(marks, f"scene {scene.name}"):
-            raise InputError(twice)
         return cls(scene, without_fasteners(last), fasteners[0], plan_of(marks))
 
     def candidates(self, holes: str | None, options: TableOptions = AS_NAMED) -> tuple[Plan, Names]:
@@ -100,7 +98,8 @@ class MovableFasteners:
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
         for installed in () if self.scene.stages else self.bare.effects_of(SpringEffect):
             faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
-        return faults + _twice(points, source)
+        twice = [points[k].tolist() for _, k in crowded(points)]
+        return [*faults, *(Fault(source, "x, y", place, "is there twice") for place in twice)]
 
     def _on_parts(self, points: Matrix) -> Mask:
         joint = self.bare.joint
@@ -133,10 +132,6 @@ def without_fasteners(scene: JointScene) -> JointScene:
     others = [not isinstance(effect, Fasteners) for effect in scene.effects]
     effects, origin = compress(scene.effects, others), compress(scene.numbers, others)
     return replace(scene, effects=tuple(effects), origin=tuple(origin))
-
-
-def _twice(points: Matrix, source: str) -> list[Fault]:
-    return [Fault(source, "x, y", points[k].tolist(), "is there twice") for _, k in crowded(points)]
 
 
 def plan_of(points: Matrix) -> Plan:
