@@ -95,12 +95,9 @@ def test_again_solves_nothing_and_more_cases_extend() -> None:
 
 
 def test_fewer_cases_are_the_first_of_them() -> None:
-    def rows(count: int) -> list[dict[str, Any]]:
-        return run_series("strip.toml", "fewer", GapCases(count=count), report=False).rows
-
-    longer = rows(5)
-    assert rows(2) == longer[:2]
-    assert rows(5) == longer
+    counts = (GapCases(count=count) for count in (5, 2))
+    longer, fewer = (run_series("strip.toml", "fewer", cases, report=False).rows for cases in counts)
+    assert fewer == longer[:2]
 
 
 @pytest.mark.parametrize("change", [("--sd", "0.3"), ("--limit", "1e-6")])
