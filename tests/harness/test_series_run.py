@@ -229,16 +229,11 @@ def test_a_table_may_grow_and_not_change() -> None:
     assert "12 cases, 8 already" in solved(gaps)
 
 
-def test_a_sweep_starts_from_its_neighbour(tmp_path: Path) -> None:
+def test_a_sweep_starts_from_its_neighbour() -> None:
     series("--sweep", "initial_gap.mean=0.1:1.0:40", "--solver", "gi", "--out", "swept")
     rows = rows_of("swept")
     assert [row["warm_from"] for row in rows[1:]] == list(range(39))
     assert rows[7]["initial_gap.mean"] == pytest.approx(0.1 + 7 * 0.9 / 39)
-    scene = read_scene(str(write_strip(tmp_path, ("mean = 0.4", f"mean = {rows[7]['initial_gap.mean']}"))))
-    data = prepared(scene)
-    case = load_case(scene)
-    gap = case.g - data.assembly.A.T @ solve_by_nnls(data, case)[0]
-    np.testing.assert_allclose(gaps_of("swept")[7], gap, rtol=1e-7, atol=1e-9)
 
 
 def test_what_cannot_be_together_is_said_at_once() -> None:
