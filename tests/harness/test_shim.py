@@ -105,7 +105,7 @@ def test_the_least_of_all_plans_is_found(strip: Path, patches: str, share: float
 
 def test_a_force_counts_as_a_gap_with_the_same_share_of_its_limit(strip: Path) -> None:
     search = search_of(PlanSession(study_of(strip, "4x1", (100.0, inf))), 1.0, STOCK)
-    (outcome,) = search.outcomes([()], [0], 50)
+    (outcome,) = search.outcomes([()], [0])
     assert outcome.largest[0] == max(*outcome.further[0][:5], outcome.further[0][-2] / 100.0)
     assert outcome.further[0][-2] >= 40.0  # a fastener's preload
     assert search._enough(0.04, 1e-13) == [0.08]  # a gap that is too large by rounding alone needs more, too
@@ -462,7 +462,7 @@ class FewFigures(ShimSearch):
         """By how much the gap of each patch is too large, mm."""
         return np.array(self.needs) - t
 
-    def outcomes(self, plans: Any, cases: Any, most: int, base: Any = None) -> list[Outcome]:
+    def outcomes(self, plans: Any, cases: Any, base: Any = None) -> list[Outcome]:
         made = []
         for plan in plans:
             left = self.limit_mm + self.excess(self.sizes(plan)[:, 0])
@@ -474,9 +474,9 @@ class FewFigures(ShimSearch):
 def test_growth_gives_what_the_gaps_ask_for_in_all_cases_but_those_that_may_fail(study: ShimStudy) -> None:
     """And yields plans by their cost, whatever they begin with."""
     search = FewFigures(lambda some: [], 2, 1, 0.08, study, (0.01, 0.02, 0.03, 0.04, 0.05, 0.06))
-    (outcome,) = search.outcomes([()], range(2), 50)
+    (outcome,) = search.outcomes([()], range(2))
     assert search.thicker((), outcome) == ((0, 0.03), (2, 0.05))
-    assert search.thicker(((0, 0.01), (1, 0.02)), search.outcomes([((0, 0.01), (1, 0.02))], (), 0)[0]) == (
+    assert search.thicker(((0, 0.01), (1, 0.02)), search.outcomes([((0, 0.01), (1, 0.02))], ())[0]) == (
         (0, 0.03),
         (1, 0.02),
         (2, 0.05),
@@ -546,7 +546,7 @@ def test_contacts_on_a_line_have_the_areas_of_the_first_face(tmp_path: Path) -> 
 def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:
     (tmp_path / "half.csv").write_text("x_min,x_max,y_min,y_max\n0,60,0,50\n")
     search = search_of(PlanSession(study_of(strip, str(tmp_path / "half.csv"))), 0.1, STOCK)
-    (outcome,) = search.outcomes([((0, 0.02),)], [0], 50)
+    (outcome,) = search.outcomes([((0, 0.02),)], [0])
     inside, beyond = outcome.further[0][:2]
     assert inside < beyond == outcome.largest[0]
 
