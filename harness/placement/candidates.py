@@ -43,8 +43,8 @@ class MovableFasteners:
 
     @classmethod
     def of(cls, scene: Scene) -> "MovableFasteners":
-        """Raises InputError as `movable_fasteners` does, or if a stage has only some of them, or names them by
-        their numbers.
+        """Raises InputError as `movable_fasteners` does, or if a stage has only some of them, or names them
+        by their numbers.
         """
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)

@@ -23,8 +23,8 @@ from .patches import Patch
 class ShimStudy(Study):
     """An item is the number of a patch, and a thickness, mm, or one at each end of its longer side.
 
-    patches : what a plan may fill. limits : of force, N, and stress, N/mm². ends : how many thicknesses a shim
-    has, 1 or 2.
+    patches : what a plan may fill. limits : of force, N, and stress, N/mm². ends : how many thicknesses a
+    shim has, 1 or 2.
     """
 
     patches: tuple[Patch, ...]
