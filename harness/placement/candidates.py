@@ -23,7 +23,6 @@ Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
 Names = dict[Place, str]
 
-ROWS_AND_COLUMNS = re.compile(r"(\d{0,9})x(\d{0,9})")
 ROWS = range(1, 5)  # of uniform plans
 DIGITS = 6  # of a place in mm: to the nanometre
 
@@ -69,12 +68,8 @@ class MovableFasteners:
         """
         if holes is None:
             return self.current, {}
-        if pattern := ROWS_AND_COLUMNS.fullmatch(holes):
-            rows, columns = (int(number or 0) for number in pattern.groups())
-            if not 0 < rows * columns <= MOST:
-                allowed = f"rows x columns, 1 to {MOST} holes, or a CSV file"
-                raise InputError.one("--candidates", "holes", holes, allowed)
-            points = grid(self.bare, rows, columns).round(DIGITS)
+        if cells := cells_of(holes, "--candidates", "rows x columns", "holes", MOST):
+            points = grid(self.bare, *cells).round(DIGITS)
             points, faults, labels = points[self._on_parts(points)], [], []
             if not len(points):
                 allowed = "cells of which a middle is on the parts"
@@ -136,6 +131,18 @@ def without_fasteners(scene: JointScene) -> JointScene:
 
 def plan_of(points: Matrix) -> Plan:
     return tuple(sorted({(x, y) for x, y in points.round(DIGITS).tolist()}))
+
+
+def cells_of(text: str, option: str, order: str, items: str, most: int) -> tuple[int, int] | None:
+    """Both numbers of a pattern as `4x32`; None of the path of a file. Raises InputError if there are more
+    than `most` cells, or none.
+    """
+    if not (pattern := re.fullmatch(r"(\d{0,9})x(\d{0,9})", text)):
+        return None
+    first, second = (int(number or 0) for number in pattern.groups())
+    if not 0 < first * second <= most:
+        raise InputError.one(option, items, text, f"{order}, 1 to {most} {items}, or a CSV file")
+    return first, second
 
 
 def uniform_plans(bare: JointScene, count: int) -> list[Plan]:
