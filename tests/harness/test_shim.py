@@ -455,6 +455,28 @@ def test_a_stock_that_is_too_thin_says_where(strip: Path, tmp_path: Path) -> Non
         assert text in done.output
 
 
+def test_two_shims_change_together_where_one_alone_does_not_help(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gap = "mean = 0.072\nrandom = { sd = 0.0292, correlation_length = 93.6, seed = 12 }"
+    points = "preload = 117.0\npoints = [[25.5, 63.2], [131.0, 5.19]]"
+    effects = [
+        f'[[effect]]\nkind = "{kind}"\n{text}\n'
+        for kind, text in (("initial_gap", gap), ("fasteners", points))
+    ]
+    path = tmp_path / "joint.toml"
+    path.write_text("\n".join([two_parts(length=155.0, width=77.9, nodes=(13, 4)), *effects]))
+    scene = scene_at(path)
+    patches = patches_of(scene.joint, "5x1")
+    session = PlanSession(ShimStudy(scene, scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf)))
+    search = search_of(session, 0.0255, (0.038, 0.056, 0.06))
+    _, together = search.once(())
+    monkeypatch.setattr(ShimSearch, "walked", lambda *_: ((), False))
+    _, alone = search.once(())
+    assert together.gap_mm <= 0.0255
+    assert search.cost(together.plan) < search.cost(alone.plan)
+
+
 class FewFigures(ShimSearch):
     """Each patch of 1 mm² asks for `needs` in one case, and in another, which may fail, for 0.09 mm more."""
 
