@@ -19,7 +19,7 @@ def study_of(path: Path, patches: str, limits: tuple[float, float] = (inf, inf),
     scene = scene_at(path)
     bare = last_scene(scene)
     cases = Listed((load_case(bare),))
-    return ShimStudy(bare, cases, "dual", patches_of(scene.joint, patches), limits, scene, ends)
+    return ShimStudy(scene, bare, cases, "dual", patches_of(scene.joint, patches), limits, ends)
 
 
 def search_of(session: PlanSession, limit_mm: float, stock: tuple[float, ...]) -> ShimSearch:

@@ -23,7 +23,6 @@ Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
 Names = dict[Place, str]
 
-ROWS_AND_COLUMNS = re.compile(r"(\d{0,9})x(\d{0,9})")
 ROWS = range(1, 5)  # of uniform plans
 DIGITS = 6  # of a place in mm: to the nanometre
 
@@ -43,8 +42,8 @@ class MovableFasteners:
 
     @classmethod
     def of(cls, scene: Scene) -> "MovableFasteners":
-        """Raises InputError as `movable_fasteners` does, if two are at one place, or if a stage has only some
-        of them, or names them by their numbers.
+        """Raises InputError as `movable_fasteners` does, or if a stage has only some of them, or names them
+        by their numbers.
         """
         fasteners = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
@@ -57,8 +56,6 @@ class MovableFasteners:
             allowed = "its name alone: a plan may have another number of points"
             raise InputError.one(f"scene {scene.name}", "fasteners in stages", parts, allowed)
         marks = np.concatenate([each.marks(scene.joint) for each in fasteners])
-        if twice := _twice(marks, f"scene {scene.name}"):
-            raise InputError(twice)
         return cls(scene, without_fasteners(last), fasteners[0], plan_of(marks))
 
     def candidates(self, holes: str | None, options: TableOptions = AS_NAMED) -> tuple[Plan, Names]:
@@ -71,12 +68,8 @@ class MovableFasteners:
         """
         if holes is None:
             return self.current, {}
-        if pattern := ROWS_AND_COLUMNS.fullmatch(holes):
-            rows, columns = (int(number or 0) for number in pattern.groups())
-            if not 0 < rows * columns <= MOST:
-                allowed = f"rows x columns, 1 to {MOST} holes, or a CSV file"
-                raise InputError.one("--candidates", "holes", holes, allowed)
-            points = grid(self.bare, rows, columns).round(DIGITS)
+        if cells := cells_of(holes, "--candidates", "rows x columns", "holes", MOST):
+            points = grid(self.bare, *cells).round(DIGITS)
             points, faults, labels = points[self._on_parts(points)], [], []
             if not len(points):
                 allowed = "cells of which a middle is on the parts"
@@ -100,7 +93,8 @@ class MovableFasteners:
         placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
         for installed in () if self.scene.stages else self.bare.effects_of(SpringEffect):
             faults += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
-        return faults + _twice(points, source)
+        twice = [points[k].tolist() for _, k in crowded(points)]
+        return [*faults, *(Fault(source, "x, y", place, "is there twice") for place in twice)]
 
     def _on_parts(self, points: Matrix) -> Mask:
         joint = self.bare.joint
@@ -135,12 +129,20 @@ def without_fasteners(scene: JointScene) -> JointScene:
     return replace(scene, effects=tuple(effects), origin=tuple(origin))
 
 
-def _twice(points: Matrix, source: str) -> list[Fault]:
-    return [Fault(source, "x, y", points[k].tolist(), "is there twice") for _, k in crowded(points)]
-
-
 def plan_of(points: Matrix) -> Plan:
     return tuple(sorted({(x, y) for x, y in points.round(DIGITS).tolist()}))
+
+
+def cells_of(text: str, option: str, order: str, items: str, most: int) -> tuple[int, int] | None:
+    """Both numbers of a pattern as `4x32`; None of the path of a file. Raises InputError if there are more
+    than `most` cells, or none.
+    """
+    if not (pattern := re.fullmatch(r"(\d{0,9})x(\d{0,9})", text)):
+        return None
+    first, second = (int(number or 0) for number in pattern.groups())
+    if not 0 < first * second <= most:
+        raise InputError.one(option, items, text, f"{order}, 1 to {most} {items}, or a CSV file")
+    return first, second
 
 
 def uniform_plans(bare: JointScene, count: int) -> list[Plan]:

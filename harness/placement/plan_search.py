@@ -84,7 +84,7 @@ class PlanSearch(ABC):
         return self.wholes([plan], moved)[0]
 
     def wholes(self, plans: Sequence[Plan], moved: str = "") -> list[Step]:
-        outcomes = self.outcomes(plans, range(self.cases), TOGETHER)
+        outcomes = self.outcomes(plans, range(self.cases))
         steps = [
             Step(p, self.gap(outcome), outcome, moved) for p, outcome in zip(plans, outcomes, strict=True)
         ]
@@ -95,11 +95,13 @@ class PlanSearch(ABC):
         return steps
 
     def outcomes(
-        self, plans: Sequence[Plan], cases: Sequence[int], most: int, base: Plan | None = None
+        self, plans: Sequence[Plan], cases: Sequence[int], base: Plan | None = None
     ) -> list[Outcome]:
-        """The outcome of each plan. The cases are asked in an even number of parts, for two workers; most :
-        cases in two parts.
+        """The outcome of each plan, proven, or estimated from the base.
+
+        The cases are asked in an even number of parts, for two workers.
         """
+        most = TOGETHER if base is None else ESTIMATED
         parts = [tuple(part.tolist()) for part in np.array_split(cases, 2 * -(-len(cases) // most))]
         answers = self.ask([Question(tuple(plans), part, base) for part in parts if part])
         names = [field.name for field in fields(Outcome)]

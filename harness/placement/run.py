@@ -151,7 +151,7 @@ def place(
         raise InputError(faults)
     (newton,) = described([("newton", {})], None, "--solver", reporter)
     form = form_of_search(directory / records.PLANS, movable.scene, newton.forms, cases, len(holes))
-    study = FastenerStudy(movable.bare, cases.of_search(movable.scene, form), form, movable)
+    study = FastenerStudy.of(movable, cases.of_search(movable.scene, form), form)
     for sentence in (*study.scene.unusual, *study.cases.notes):
         reporter.say(sentence)
     goal = Goal(allow_gap_mm, Goal.share_of(share, study.cases.count), count)

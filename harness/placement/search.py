@@ -29,7 +29,7 @@ from math import comb, dist
 from typing import TypeAlias
 
 from harness.placement.candidates import Place, Plan, uniform_plans
-from harness.placement.plan_search import ESTIMATED, PlanSearch, Step
+from harness.placement.plan_search import PlanSearch, Step
 from problems.forms.assembly import Matrix
 from problems.model.scene import JointScene
 
@@ -203,7 +203,7 @@ class Search(PlanSearch):
 
     def _values(self, step: Step, plans: Sequence[Plan], cases: tuple[int, ...] = ()) -> list[Value]:
         """φ of other plans, estimated in `cases`, by default the worst ones of the step."""
-        outcomes = self.outcomes(plans, cases or self.deciding(step), ESTIMATED, step.plan)
+        outcomes = self.outcomes(plans, cases or self.deciding(step), step.plan)
         return [self.value(outcome) for outcome in outcomes]
 
 

@@ -21,7 +21,7 @@ def identity_of(study: FastenerStudy, current: Plan, candidates: Plan, goal: Goa
     return {
         **asdict(goal),
         **{name: f"{counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
-        "fastener": study.movable.fastener.model_dump(mode="json", include={"preload", "between"}),
+        "fastener": study.fastener.model_dump(mode="json", include={"preload", "between"}),
         **study.identity,
     }
 
@@ -50,7 +50,7 @@ def record_of(
         "title": scene.title,
         "cases": len(result.numbers),
         "chosen_by_share": 1 - goal.allowed_choosing(len(result.numbers)) / len(result.numbers),
-        "preload": study.movable.fastener.preload,
+        "preload": study.fastener.preload,
         "stages": [stage.name for stage in scene.stages],
         **asdict(goal),
         "confidence": CONFIDENCE,

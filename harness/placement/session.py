@@ -50,17 +50,13 @@ POWER = 8  # of the mean of gaps that stands for the largest one where that does
 
 @dataclass(frozen=True)
 class Study(ABC):
-    """The last stage of a scene without the items of a plan, and its load cases."""
+    """A scene, its last stage without the items of a plan, and its load cases."""
 
+    scene: JointScene
     bare: JointScene
     cases: LoadCases
     form: Form
     key: str = field(default_factory=lambda: uuid4().hex, kw_only=True)
-
-    @property
-    def scene(self) -> JointScene:
-        """The scene whose stages a plan goes through."""
-        return self.bare
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -90,17 +86,17 @@ class Study(ABC):
 class FastenerStudy(Study):
     """Some stages have the fasteners."""
 
-    movable: MovableFasteners
+    fastener: Fasteners
 
-    @property
-    def scene(self) -> JointScene:
-        return self.movable.scene
+    @classmethod
+    def of(cls, movable: MovableFasteners, cases: LoadCases, form: Form) -> "FastenerStudy":
+        return cls(movable.scene, movable.bare, cases, form, movable.fastener)
 
     def bare_stage(self, part: JointScene, plan: Plan) -> tuple[JointScene, Plan]:
         return without_fasteners(part), plan if any(part.effects_of(Fasteners)) else ()
 
     def effect(self, item: Place) -> Fasteners:
-        return self.movable.fastener.model_copy(update={"points": (item,), "pattern": None})
+        return self.fastener.model_copy(update={"points": (item,), "pattern": None})
 
 
 @dataclass(frozen=True)

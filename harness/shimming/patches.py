@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.placement.candidates import ROWS_AND_COLUMNS, Place
+from harness.placement.candidates import Place, cells_of
 from problems.effects.shims import Shims
 from problems.errors import Fault, InputError
 from problems.input.bounded_types import LARGEST
@@ -70,11 +70,7 @@ def patches_of(joint: AnyJoint, source: str | None) -> tuple[Patch, ...]:
         length, width = np.ptp(joint.bounds, axis=0)
         columns = int(np.clip(round((USUAL * length / width) ** 0.5), 1, USUAL))
         source = f"{columns}x{USUAL // columns}"
-    if pattern := ROWS_AND_COLUMNS.fullmatch(source):
-        counts = [int(number or 0) for number in pattern.groups()]
-        if not 0 < counts[0] * counts[1] <= MOST:
-            allowed = f"columns x rows, 1 to {MOST} patches, or a CSV file"
-            raise InputError.one("--patches", "patches", source, allowed)
+    if counts := cells_of(source, "--patches", "columns x rows", "patches", MOST):
         x, y = (np.linspace(low, high, n + 1) for (low, high), n in zip(joint.bounds.T, counts, strict=True))
         cells = product(pairwise(y.tolist()), pairwise(x.tolist()))
         shapes = [(str(k), corners_of(*across, *up), "") for k, (up, across) in enumerate(cells, start=1)]

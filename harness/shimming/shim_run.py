@@ -182,7 +182,7 @@ def shim(
     limits, listed = (allow_force or inf, allow_stress or inf), isinstance(made, MeasuredGaps)
     also = "".join(f", {most:g} {unit}" for most, unit in zip(limits, UNITS, strict=True) if most < inf)
     goal = Goal(allow_gap_mm, Goal.share_of(share, made.count), also=also)
-    study = ShimStudy(bare, made, form, there, limits, read, 1 + taper)
+    study = ShimStudy(read, bare, made, form, there, limits, 1 + taper)
     if each and not listed and goal.allowed_fresh(made.count, ALPHA) < 0:
         allowed = f"{made.count} cases cannot show it: take {goal.least(ALPHA / 2)}, or a share of 1"
         raise InputError.one("--share", "share", goal.share, allowed)

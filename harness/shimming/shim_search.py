@@ -30,7 +30,7 @@ from typing import Self
 import numpy as np
 
 from harness.placement.candidates import Plan
-from harness.placement.plan_search import DIGITS, ESTIMATED, MORE_CASES, PlanSearch, Step
+from harness.placement.plan_search import DIGITS, MORE_CASES, PlanSearch, Step
 from harness.placement.session import Outcome
 from problems.forms.assembly import Matrix
 from report.document.numbers import beside
@@ -55,13 +55,13 @@ class ShimSearch(PlanSearch):
     stock: Sequence[float]
 
     def outcomes(
-        self, plans: Sequence[Plan], cases: Sequence[int], most: int, base: Plan | None = None
+        self, plans: Sequence[Plan], cases: Sequence[int], base: Plan | None = None
     ) -> list[Outcome]:
         def used(figures: Sequence[float]) -> float:
             shares = [value / limit for value, limit in zip(figures[-2:], self.study.limits, strict=True)]
             return max(*figures[: len(self.study.masks)], self.limit_mm * max(shares))
 
-        made = super().outcomes(plans, cases, most, base)
+        made = super().outcomes(plans, cases, base)
         return [replace(one, largest=tuple(map(used, one.further))) for one in made]
 
     def used(self, step: Step) -> str:
@@ -117,7 +117,7 @@ class ShimSearch(PlanSearch):
         """No shims; where nothing gets there from them, the best with one thickness everywhere."""
         yield ()
         plans = [self.plan(np.full_like(self.sizes(()), t)) for t in self.stock]
-        outcomes = self.outcomes(plans, cases, ESTIMATED, ())
+        outcomes = self.outcomes(plans, cases, ())
         yield min(zip([self.strict.value(one)[0] for one in outcomes], plans, strict=True))[1]
 
     def proven_growth(self, plan: Plan) -> list[Step]:
@@ -137,7 +137,7 @@ class ShimSearch(PlanSearch):
         whether it helps or not, but never to a plan twice; it ends after IDLE steps that did not lower G.
         """
         base, seen, idle = plan, {plan}, 0
-        (outcome,) = self.outcomes([plan], cases, ESTIMATED, base)
+        (outcome,) = self.outcomes([plan], cases, base)
         best = (inf, inf), plan
         while idle < IDLE:
             less = self.cost(plan) < below
@@ -145,7 +145,7 @@ class ShimSearch(PlanSearch):
             options = [one for one in options if one not in seen and self.cost(one) < below]
             if not options:
                 break
-            made = self.outcomes(options, cases, ESTIMATED, base)
+            made = self.outcomes(options, cases, base)
             values = [(self.value(one), option) for one, option in zip(made, options, strict=True)]
             k = values.index(min(values))
             outcome, plan = made[k], options[k]
@@ -235,7 +235,7 @@ class ShimSearch(PlanSearch):
                 yield heappop(kept)[1]
                 continue
             some = [heappop(waiting) for _ in waiting[:AT_ONCE]]
-            outcomes = self.outcomes([plan for _, plan, _ in some], cases, ESTIMATED, base)
+            outcomes = self.outcomes([plan for _, plan, _ in some], cases, base)
             for (cost, plan, held), outcome in zip(some, outcomes, strict=True):
                 if self.gap(outcome) <= self.limit_mm:
                     if (cost, plan) not in kept:

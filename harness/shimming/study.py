@@ -13,7 +13,6 @@ from harness.scene.stress import largest_of
 from problems.effects.shims import Shims
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 from problems.model.fastener_forces import fastener_forces, force_error
-from problems.model.scene import JointScene
 from problems.model.springs import Springs
 from problems.storage import digest
 
@@ -24,18 +23,13 @@ from .patches import Patch
 class ShimStudy(Study):
     """An item is the number of a patch, and a thickness, mm, or one at each end of its longer side.
 
-    patches : what a plan may fill. limits : of force, N, and stress, N/mm². staged : the scene with its
-    stages. ends : how many thicknesses a shim has, 1 or 2.
+    patches : what a plan may fill. limits : of force, N, and stress, N/mm². ends : how many thicknesses a
+    shim has, 1 or 2.
     """
 
     patches: tuple[Patch, ...]
     limits: tuple[float, float]
-    staged: JointScene
     ends: int = 1
-
-    @property
-    def scene(self) -> JointScene:
-        return self.staged
 
     @property
     def identity(self) -> dict[str, Any]:

@@ -225,17 +225,16 @@ value = 1e-4
     assert table["input"].tolist() == [*sd] * 3
 
 
-def test_a_gap_that_does_not_vary_has_no_contributors(tmp_path: Path) -> None:
-    cases = drawn(read_scene(str(write_strip(tmp_path))), 2, "pressure.value=normal(1e-4, 1e-5)")
-    found = of_gaps(series_of(cases, 0.1 + 1e-12 * np.arange(8) / 8))
-    assert not found.drop(columns="input").to_numpy().any()
-
-
-def test_a_gap_that_is_not_proven_is_not_taken_for_constant(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("error_mm", "varies"), [(1e-12, False), (np.nan, True)])
+def test_a_gap_that_is_proven_not_to_vary_has_no_contributors(
+    tmp_path: Path, error_mm: float, varies: bool
+) -> None:
+    """One that is not proven is not taken for constant."""
     cases = drawn(read_scene(str(write_strip(tmp_path))), 2, "pressure.value=normal(1e-4, 1e-5)")
     gaps = 0.1 + 1e-12 * np.arange(8) / 8
-    found = indices(series_of(cases, gaps), gaps, np.nan)
-    assert found["total_order"].all()
+    found = indices(series_of(cases, gaps), gaps, error_mm)
+    assert found["total_order"].all() == varies
+    assert found.drop(columns="input").to_numpy().any() == varies
 
 
 @pytest.mark.parametrize(

@@ -95,19 +95,15 @@ def test_again_solves_nothing_and_more_cases_extend() -> None:
 
 
 def test_fewer_cases_are_the_first_of_them() -> None:
-    def rows(count: int) -> list[dict[str, Any]]:
-        return run_series("strip.toml", "fewer", GapCases(count=count), report=False).rows
-
-    longer = rows(5)
-    assert rows(2) == longer[:2]
-    assert rows(5) == longer
+    counts = (GapCases(count=count) for count in (5, 2))
+    longer, fewer = (run_series("strip.toml", "fewer", cases, report=False).rows for cases in counts)
+    assert fewer == longer[:2]
 
 
-@pytest.mark.parametrize("change", [("--sd", "0.3"), ("--limit", "1e-6")])
-def test_another_series_is_refused(change: tuple[str, str]) -> None:
+def test_another_series_is_refused() -> None:
     series("--cases", "3", "--out", "mine")
-    ended = series("--cases", "3", "--out", "mine", *change, code=2)
-    assert "name another directory" in ended.output
+    ended = series("--cases", "3", "--out", "mine", "--sd", "0.3", "--limit", "1e-6", code=2)
+    assert ended.output.count("name another directory") == 2
     assert len(rows_of("mine")) == 3
 
 
@@ -232,16 +228,11 @@ def test_a_table_may_grow_and_not_change() -> None:
     assert "12 cases, 8 already" in solved(gaps)
 
 
-def test_a_sweep_starts_from_its_neighbour(tmp_path: Path) -> None:
+def test_a_sweep_starts_from_its_neighbour() -> None:
     series("--sweep", "initial_gap.mean=0.1:1.0:40", "--solver", "gi", "--out", "swept")
     rows = rows_of("swept")
     assert [row["warm_from"] for row in rows[1:]] == list(range(39))
     assert rows[7]["initial_gap.mean"] == pytest.approx(0.1 + 7 * 0.9 / 39)
-    scene = read_scene(str(write_strip(tmp_path, ("mean = 0.4", f"mean = {rows[7]['initial_gap.mean']}"))))
-    data = prepared(scene)
-    case = load_case(scene)
-    gap = case.g - data.assembly.A.T @ solve_by_nnls(data, case)[0]
-    np.testing.assert_allclose(gaps_of("swept")[7], gap, rtol=1e-7, atol=1e-9)
 
 
 def test_what_cannot_be_together_is_said_at_once() -> None:

@@ -1,6 +1,7 @@
 """Which shims close the gap: plans against other answers and full enumeration; refused, resumed, drawn."""
 
 import json
+from collections import Counter
 from dataclasses import replace
 from hashlib import sha256
 from itertools import product
@@ -19,7 +20,6 @@ from small_joints import FASTENERS, GAP, INLINE, JOINT, PART, make_joint, scene_
 from superelements import flat, scene_from, write_part
 
 from harness import solve
-from harness.placement.answer_journal import AnswerJournal
 from harness.placement.fresh_cases import Goal, Sample, SearchOutcome
 from harness.placement.plan_search import Step
 from harness.placement.session import Outcome, PlanSession, Question
@@ -44,7 +44,9 @@ from report.writers import shim_report
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
 RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
+SHEET = '[[effect]]\nkind = "shims"\nthickness = 0.02\nx = [50.0, 100.0]\ny = [0.0, 50.0]\n'
 STOCK = (0.02, 0.04, 0.08)
+ASKED = ("--allow-gap", 0.08, "--stock", "0.02,0.04,0.08", "--patches", "4x1")
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +63,7 @@ def study(strip: Path) -> ShimStudy:
 
 
 def shim(path: Path, out: Path, *words: object) -> Any:
-    stock = ("--allow-gap", 0.08, "--stock", "0.02,0.04,0.08", "--patches", "4x1")
-    return harness("shim", path, *stock, "--out", out, *words)
+    return harness("shim", path, *ASKED, "--out", out, *words)
 
 
 def record_of(directory: Path) -> dict[str, Any]:
@@ -86,18 +87,6 @@ def test_a_plan_leaves_what_a_scene_with_its_shims_leaves(strip: Path) -> None:
     assert study.areas.sum() == pytest.approx(200.0 * 50.0)
 
 
-def test_a_shim_over_all_contacts_is_a_smaller_gap(strip: Path) -> None:
-    """To the last bit, at thicknesses that binary numbers hold."""
-    scene = scene_at(strip)
-    gap = next(effect for effect in scene.effects if effect.kind == "initial_gap")
-    flat = [gap.model_copy(update={"mean": mean, "random": None}) for mean in (0.5, 0.25)]
-    rest = [effect for effect in scene.effects if effect is not gap]
-    sheet = Shims(kind="shims", thickness=0.25, x=(0.0, 200.0), y=(0.0, 50.0))
-    shimmed, smaller = (replace(scene, effects=(*rest, *some)) for some in ([flat[0], sheet], [flat[1]]))
-    assert load_case(shimmed).g.tobytes() == load_case(smaller).g.tobytes()
-    assert solve(shimmed).gap.tobytes() == solve(smaller).gap.tobytes()
-
-
 @pytest.mark.parametrize(("patches", "share"), [("4x1", 0.7), ("2x2", 0.35)])
 def test_the_least_of_all_plans_is_found(strip: Path, patches: str, share: float) -> None:
     """Against all 4⁴ plans of four patches and three thicknesses; the limit is a share of the gap without."""
@@ -116,7 +105,7 @@ def test_the_least_of_all_plans_is_found(strip: Path, patches: str, share: float
 
 def test_a_force_counts_as_a_gap_with_the_same_share_of_its_limit(strip: Path) -> None:
     search = search_of(PlanSession(study_of(strip, "4x1", (100.0, inf))), 1.0, STOCK)
-    (outcome,) = search.outcomes([()], [0], 50)
+    (outcome,) = search.outcomes([()], [0])
     assert outcome.largest[0] == max(*outcome.further[0][:5], outcome.further[0][-2] / 100.0)
     assert outcome.further[0][-2] >= 40.0  # a fastener's preload
     assert search._enough(0.04, 1e-13) == [0.08]  # a gap that is too large by rounding alone needs more, too
@@ -211,25 +200,23 @@ def test_patches_of_a_gap_need_shims_that_change_nothing_else(strip: Path) -> No
     assert patches_of_gap(joint, answer.gap, answer.gap.max()) == ()
 
 
-def test_what_could_not_be_read_is_refused_before_the_search(
-    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (FASTENERS + RIVET, "", ["no fasteners"]),
+        (RIVET, RIVET + SHEET, ["--patches: 1, outline", "both fill the contact at 50, 0 mm"]),
+        ('"initial_gap"', '"initial_gap"\nname = "shims"', ["another name: that of a kind"]),
+    ],
+)
+def test_a_scene_that_shims_do_not_fit_is_refused_before_the_search(
+    strip: Path, tmp_path: Path, old: str, new: str, said: list[str]
 ) -> None:
-    monkeypatch.setattr("harness.shimming.shim_run.edited", lambda *_: "joint = 1\n")
-    done = shim(strip, tmp_path / "out", "--cases", 2, "--share", 1)
-    assert done.exit_code == 2
-    assert "shimmed.toml: joint = 1" in done.output
-    assert not (tmp_path / "out" / "shims.jsonl").exists()
-
-
-def test_a_shim_that_could_not_be_read_is_refused_before_the_search(strip: Path, tmp_path: Path) -> None:
-    """The scene alone could: an effect has the name that shims have without one."""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(strip.read_text().replace('"initial_gap"', '"initial_gap"\nname = "shims"'))
-    read_scene(str(scene))
-    done = shim(scene, tmp_path / "out", "--cases", 2, "--share", 1)
-    assert done.exit_code == 2
-    assert "another name: that of a kind" in " ".join(done.output.split())
-    assert not (tmp_path / "out" / "shims.jsonl").exists()
+    """Contacts on a border would be filled twice; an effect has the name that shims have by default."""
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene.write_text(strip.read_text().replace(old, new))
+    told = wrong_usage("shim", scene, *ASKED, "--cases", 2, "--share", 1, "--out", out)
+    assert all(text in told for text in said)
+    assert not (out / "shims.jsonl").exists()
 
 
 @pytest.mark.usefixtures("without_report")
@@ -273,42 +260,39 @@ def test_a_region_is_divided_where_its_parts_differ_least(strip: Path) -> None:
     assert ends == [(0.0, 45.0), (45.0, 65.0), (155.0, 200.0)]
 
 
+@pytest.mark.parametrize(
+    ("ends", "patches", "limit", "words"),
+    [
+        (1, "4x1", 0.08, ("--stock", "0.02,0.04,0.08", "--mean", 0.08)),
+        (2, "2x1", 0.03, ("--stock", "0.02,0.05", "--mean", 0.05, "--taper")),
+    ],
+)
 def test_each_joint_has_shims_of_its_own(
-    strip: Path, study: ShimStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    strip: Path, tmp_path: Path, ends: int, patches: str, limit: float, words: tuple[Any, ...]
 ) -> None:
-    """What `solve` says of each of them with its shims; the same after an interruption; the stock adds up."""
-    words, keep, kept = ("--each", "--cases", 3, "--share", 1, "--mean", 0.08), AnswerJournal._keep, [0]
-
-    def interrupted(self: AnswerJournal, *answer: Any) -> None:
-        keep(self, *answer)
-        kept[0] += 1
-        if kept[0] == 2:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr("report.writers.shim_report.write", Path)  # slow
-        patch.setattr(AnswerJournal, "_keep", interrupted)
-        assert shim(strip, tmp_path / "parts", *words).exit_code == 130
-        patch.setattr(AnswerJournal, "_keep", keep)
-        assert shim(strip, tmp_path / "parts", *words).exit_code in (0, 4)
-    done = shim(strip, tmp_path / "whole", *words)
+    """What `solve` says of each with its shims; the stock adds up, tapered pieces from the thin end."""
+    path, out = tmp_path / "scene.toml", tmp_path / "out"
+    path.write_text(strip.read_text().removesuffix(RIVET if ends == 2 else ""))
+    asked = ("--allow-gap", limit, "--patches", patches, *words, "--each", "--cases", 3, "--share", 1)
+    done = harness("shim", path, *asked, "--out", out)
+    assert done.exit_code in (0, 4), done.output
     assert "of 3 joints can be kept within the limits" in done.output
-    record = record_of(tmp_path / "whole")
-    assert record["joints"] == record_of(tmp_path / "parts")["joints"]
-    scene = scene_at(strip)
-    cases, pieces = GapCases(count=3, mean=0.08).of(scene, "dual"), 0
-    for joint, line in zip(
-        record["joints"], pd.read_csv(tmp_path / "whole" / "joints.csv").iloc, strict=True
-    ):
-        effects = [effect for effect in scene.effects if effect.kind != "initial_gap"]
-        effects += [study.effect(item) for item in joint["plan"]]
-        load = cases.load(joint["joint"])
-        gap = solve(with_gap(replace(scene, effects=tuple(effects)), load.g)).gap.max()
-        assert (gap <= 0.08) == joint["kept"] == line["kept"]
-        pieces += len(joint["plan"])
-    stock = pd.read_csv(tmp_path / "whole" / "stock.csv")
-    assert stock["pieces"].sum() == pieces > 0
-    assert set(stock["thickness_mm"]) <= set(STOCK)
+    scene, study = scene_at(path), study_of(path, patches, ends=ends)
+    cases, joints = GapCases(count=3, mean=words[3]).of(scene, "dual"), pd.read_csv(out / "joints.csv")
+    pieces = list[tuple[float, ...]]()
+    for k, joint in enumerate(record_of(out)["joints"]):
+        shims = [study.effect(tuple(item)) for item in joint["plan"]]
+        effects = (*(effect for effect in scene.effects if effect.kind != "initial_gap"), *shims)
+        gap = solve(with_gap(replace(scene, effects=effects), cases.load(k).g)).gap.max()
+        assert (gap <= limit) == joint["kept"] == joints["kept"][k]
+        for patch, *t in joint["plan"]:
+            name = study.patches[int(patch)].name
+            assert [joints[f"{name}{end}"][k] for end in ("", ", other end")[:ends]] == t
+            pieces.append(tuple(sorted(t)))
+    stock = pd.read_csv(out / "stock.csv")
+    sizes = stock.filter(like="thickness").itertuples(index=False, name=None)
+    assert dict(zip(sizes, stock["pieces"], strict=True)) == Counter(pieces)
+    assert pieces
 
 
 @pytest.mark.parametrize(
@@ -339,20 +323,9 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
 def test_stocks_are_lists_or_steps() -> None:
     assert stock_of("0.2,0.3,0.5") == (0.2, 0.3, 0.5)
     assert stock_of("0.05:0.2:0.05") == (0.05, 0.1, 0.15, 0.2)
-    wrong = [
-        "0",
-        "-0.1,0.2",
-        "0.3,0.2",
-        "0.2,0.2",
-        "nan",
-        "0.1:0.5",
-        "0.1:0.5:0",
-        "0.5:0.1:0.1",
-        "x",
-        "inf",
-        "1e16",
-    ]
-    none: Any = ["", [0.1, 0.2], 0.1, *wrong]
+    lists = ["", "0", "-0.1,0.2", "0.3,0.2", "0.2,0.2", "nan", "x", "1e16"]
+    steps = ["0.1:0.5", "0.1:0.5:0", "0.5:0.1:0.1"]
+    none: Any = [*lists, *steps, [0.1, 0.2], 0.1]
     for text in none:
         with pytest.raises(InputError, match="ascending"):
             stock_of(text)
@@ -392,18 +365,27 @@ def test_the_command_finds_shims_that_solve_confirms(
 
 
 @pytest.mark.usefixtures("without_report")
-def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
-    """Whose gap is as given."""
-    path = tmp_path / "flat.toml"
+@pytest.mark.parametrize(
+    ("mean", "limit", "words"),
+    [
+        (0.2, 0.08, ("--stock", "0.02,0.04,0.08", "--patches", "4x1")),
+        (0.05, 0.04, ("--stock", "0.01,0.02,0.04", "--patches", "3x1", "--taper")),
+    ],
+)
+def test_solve_says_the_same_of_one_joint(
+    strip: Path, tmp_path: Path, mean: float, limit: float, words: tuple[str, ...]
+) -> None:
+    """Whose gap is as given; a tapered shim is written with both ends."""
+    path, out = tmp_path / "flat.toml", tmp_path / "out"
     path.write_text(
-        strip.read_text().replace("random = {", "# random = {").replace("mean = 0.05", "mean = 0.2")
+        strip.read_text().replace("random = {", "# random = {").replace("mean = 0.05", f"mean = {mean}")
     )
-    done = shim(path, tmp_path / "out")
-    assert done.exit_code in (0, 4)
-    record = record_of(tmp_path / "out")
-    largest = solve(str(tmp_path / "out" / "shimmed.toml")).gap.max()
+    done = harness("shim", path, "--allow-gap", limit, *words, "--out", out)
+    assert done.exit_code in (0, 4), done.output
+    record, largest = record_of(out), solve(str(out / "shimmed.toml")).gap.max()
     assert f"{record['after']['gap']:.9f}" == f"{largest:.9f}"
-    assert (done.exit_code == 0) == (largest <= 0.08)
+    assert (done.exit_code == 0) == (largest <= limit)
+    assert all(("thickness_end_mm" in patch) == ("--taper" in words) for patch in record["patches"])
 
 
 @pytest.mark.parametrize(
@@ -413,14 +395,7 @@ def test_solve_says_the_same_of_one_joint(strip: Path, tmp_path: Path) -> None:
         (("--patches", "0x4"), ["--patches", "columns x rows"]),
         (
             ("--patches", "patches.csv"),
-            [
-                "line 2",
-                "on the junction",
-                "line 3",
-                "overlaps line 2",
-                "x_min < x_max",
-                "(9.0, 0.0), (9.0, 1.0)",
-            ],
+            ["on the junction", "line 3", "overlaps line 2", "x_min < x_max", "(9.0, 0.0), (9.0, 1.0)"],
         ),
         (("--patches", "outlines.csv"), ["line 2, outline", "two of its edges cross", "a name of its own"]),
         (("--patches", "borders.csv"), ["columns x_min, x_max, y_min, y_max, once each"]),
@@ -449,21 +424,8 @@ def test_a_limit_on_a_stress_that_no_place_tells_is_refused(
 ) -> None:
     """Before the search, in which no plan could keep it."""
     monkeypatch.setattr("harness.shimming.shim_run.none_told", lambda _: True)
-    done = shim(strip, tmp_path / "out", "--allow-stress", 50)
-    assert done.exit_code == 2
-    assert "left out: forces at points act near all elements" in " ".join(done.output.split())
-
-
-def test_patches_that_touch_a_rectangular_shim_are_refused(strip: Path, tmp_path: Path) -> None:
-    """The contacts on the border of both would be filled twice."""
-    shimmed = tmp_path / "shimmed.toml"
-    rectangle = '[[effect]]\nkind = "shims"\nthickness = 0.02\nx = [50.0, 100.0]\ny = [0.0, 50.0]\n'
-    shimmed.write_text(strip.read_text() + rectangle)
-    done = shim(shimmed, tmp_path / "out")
-    assert done.exit_code == 2
-    assert "--patches: 1, outline" in done.output
-    assert "both fill the contact at 50, 0 mm" in " ".join(done.output.split())
-    assert not (tmp_path / "out").exists()
+    told = wrong_usage("shim", strip, *ASKED, "--allow-stress", 50, "--out", tmp_path / "out")
+    assert "left out: forces at points act near all elements" in told
 
 
 def test_a_directory_of_another_command_is_refused_before_patches_are_found(
@@ -471,32 +433,19 @@ def test_a_directory_of_another_command_is_refused_before_patches_are_found(
 ) -> None:
     monkeypatch.setattr("harness.shimming.shim_run.PlanSession", lambda _: pytest.fail("solved"))
     (tmp_path / "plans.jsonl").touch()
-    asked = ("--allow-gap", 0.1, "--stock", "0.1", "--cases", 2, "--share", 1)
-    told = wrong_usage("shim", strip, *asked, "--out", tmp_path)
+    told = wrong_usage("shim", strip, "--allow-gap", 0.1, "--stock", "0.1", "--out", tmp_path)
     assert "has plans.jsonl of another command" in told
 
 
 @pytest.mark.usefixtures("without_report")
-@pytest.mark.parametrize(("command", "row"), [("shim", 2), ("place", 0)])
-def test_no_answer_of_a_table_that_has_changed_is_used(
-    strip: Path, tmp_path: Path, command: str, row: int
-) -> None:
-    gaps, where = np.full((3, 84), 0.05), ("--gaps", tmp_path / "gaps.npy", "--share", 1)
-    how = ("--out", tmp_path / "out", "--allow-gap", 0.1, *where)
-    how += ("--stock", 0.1) if command == "shim" else ("--candidates", "3x1")
-    np.save(tmp_path / "gaps.npy", gaps)
-    assert harness(command, strip, *how).exit_code in (0, 4)
-    gaps[row] = 2.0
-    np.save(tmp_path / "gaps.npy", gaps)
-    assert "cases_key" in wrong_usage(command, strip, *how)
-
-
-def test_a_scene_without_fasteners_is_refused(strip: Path, tmp_path: Path) -> None:
-    bare = tmp_path / "bare.toml"
-    bare.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.1\n')
-    done = shim(bare, tmp_path / "out")
-    assert done.exit_code == 2
-    assert "no fasteners" in done.output
+def test_no_answer_of_a_table_that_has_changed_is_used(strip: Path, tmp_path: Path) -> None:
+    gaps, table = np.full((3, 84), 0.05), tmp_path / "gaps.npy"
+    asked = ("--allow-gap", 0.1, "--stock", 0.1, "--gaps", table, "--share", 1, "--out", tmp_path / "out")
+    np.save(table, gaps)
+    assert harness("shim", strip, *asked).exit_code in (0, 4)
+    gaps[2] = 2.0
+    np.save(table, gaps)
+    assert "cases_key" in wrong_usage("shim", strip, *asked)
 
 
 def test_a_stock_that_is_too_thin_says_where(strip: Path, tmp_path: Path) -> None:
@@ -519,7 +468,7 @@ def test_two_shims_change_together_where_one_alone_does_not_help(
     path.write_text("\n".join([two_parts(length=155.0, width=77.9, nodes=(13, 4)), *effects]))
     scene = scene_at(path)
     patches = patches_of(scene.joint, "5x1")
-    session = PlanSession(ShimStudy(scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf), scene))
+    session = PlanSession(ShimStudy(scene, scene, random_gaps(scene, 1, 12), "dual", patches, (inf, inf)))
     search = search_of(session, 0.0255, (0.038, 0.056, 0.06))
     _, together = search.once(())
     monkeypatch.setattr(ShimSearch, "walked", lambda *_: ((), False))
@@ -537,7 +486,7 @@ class FewFigures(ShimSearch):
         """By how much the gap of each patch is too large, mm."""
         return np.array(self.needs) - t
 
-    def outcomes(self, plans: Any, cases: Any, most: int, base: Any = None) -> list[Outcome]:
+    def outcomes(self, plans: Any, cases: Any, base: Any = None) -> list[Outcome]:
         made = []
         for plan in plans:
             left = self.limit_mm + self.excess(self.sizes(plan)[:, 0])
@@ -549,9 +498,9 @@ class FewFigures(ShimSearch):
 def test_growth_gives_what_the_gaps_ask_for_in_all_cases_but_those_that_may_fail(study: ShimStudy) -> None:
     """And yields plans by their cost, whatever they begin with."""
     search = FewFigures(lambda some: [], 2, 1, 0.08, study, (0.01, 0.02, 0.03, 0.04, 0.05, 0.06))
-    (outcome,) = search.outcomes([()], range(2), 50)
+    (outcome,) = search.outcomes([()], range(2))
     assert search.thicker((), outcome) == ((0, 0.03), (2, 0.05))
-    assert search.thicker(((0, 0.01), (1, 0.02)), search.outcomes([((0, 0.01), (1, 0.02))], (), 0)[0]) == (
+    assert search.thicker(((0, 0.01), (1, 0.02)), search.outcomes([((0, 0.01), (1, 0.02))], ())[0]) == (
         (0, 0.03),
         (1, 0.02),
         (2, 0.05),
@@ -612,7 +561,7 @@ def test_contacts_on_a_line_have_the_areas_of_the_first_face(tmp_path: Path) -> 
     fasteners = {"kind": "fasteners", "preload": 1.0, "points": [[200.0, 60.0]]}
     scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.2}, fasteners)
     cases, patches = Listed((load_case(scene),)), patches_of(scene.joint, "2x1")
-    study = ShimStudy(scene, cases, "dual", patches, (inf, inf), scene)
+    study = ShimStudy(scene, scene, cases, "dual", patches, (inf, inf))
     np.testing.assert_allclose(study.areas, [375.0, *[750.0] * 7, 375.0])
     (outcome,) = PlanSession(study).answer(Question((((0, 0.1),),), (0,)))
     assert 0 < sum(outcome.further[0][3:6]) < 0.2 * study.areas.sum()
@@ -621,7 +570,7 @@ def test_contacts_on_a_line_have_the_areas_of_the_first_face(tmp_path: Path) -> 
 def test_a_gap_beyond_all_patches_counts(strip: Path, tmp_path: Path) -> None:
     (tmp_path / "half.csv").write_text("x_min,x_max,y_min,y_max\n0,60,0,50\n")
     search = search_of(PlanSession(study_of(strip, str(tmp_path / "half.csv"))), 0.1, STOCK)
-    (outcome,) = search.outcomes([((0, 0.02),)], [0], 50)
+    (outcome,) = search.outcomes([((0, 0.02),)], [0])
     inside, beyond = outcome.further[0][:2]
     assert inside < beyond == outcome.largest[0]
 
@@ -697,18 +646,10 @@ def test_a_patch_may_have_the_name_of_a_column_of_joints(
     assert list(table.columns) == ["joint", "kept", "shims", "kept, mm"]
 
 
-def test_liquid_shim_that_is_not_known_is_not_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A record has null for a figure of which nothing is proven."""
-    figures = dict.fromkeys(("gap_before_mm", "gap_after_mm", "liquid_mm3")) | {"thickness_mm": 0.1}
-    text = report_of(RECORD | {"patches": [PATCH | figures]}, tmp_path, monkeypatch)
-    assert "– mm³ fill what is left" in text
-
-
-def test_the_places_of_forces_are_told_to_a_hundredth_of_a_millimetre(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_figures_are_told_to_what_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A figure of which nothing is proven, null in the record, is not 0; a place is a hundredth of a mm."""
     force = {"kind": "fasteners", "x": 1077.934, "y": 0.0, "force_N": 900.0, "with_shims_N": 800.0}
-    figures = {"gap_before_mm": 0.15, "gap_after_mm": 0.05, "liquid_mm3": 1.0, "thickness_mm": 0.1}
-    record = RECORD | {"forces": [force], "patches": [PATCH | figures]}
-    text = report_of(record, tmp_path, monkeypatch)
+    figures = dict.fromkeys(("gap_before_mm", "gap_after_mm", "liquid_mm3")) | {"thickness_mm": 0.1}
+    text = report_of(RECORD | {"forces": [force], "patches": [PATCH | figures]}, tmp_path, monkeypatch)
+    assert "– mm³ fill what is left" in text
     assert "| fasteners | 1077.93 | 0 | 900 | 800 |" in " ".join(text.split())

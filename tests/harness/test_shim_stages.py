@@ -1,22 +1,18 @@
 """Shims in a scene with stages, and tapered ones: plans against `solve` on the scene with their effects."""
 
-import json
-from collections import Counter
 from dataclasses import replace
 from itertools import product
 from math import inf
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from commands import harness
 from shim_studies import search_of, study_of
-from small_joints import FASTENERS, GAP, STAGED, scene_at, two_parts, with_gap
+from small_joints import FASTENERS, GAP, STAGED, scene_at, two_parts
 
 from harness import solve, stresses
 from harness.placement.session import PlanSession, Question
-from harness.series.load_case_source import GapCases
 from problems.effects.shims import Shims
 from problems.model.fastener_forces import fastener_forces
 
@@ -104,40 +100,3 @@ def test_the_least_of_all_tapered_plans_is_found(tmp_path: Path) -> None:
     _, best = search.once(())
     assert best.gap_mm <= limit
     assert search.cost(best.plan) == min(search.cost(plan) for plan, gap in gaps.items() if gap <= limit)
-
-
-def test_each_joint_has_tapered_shims_of_its_own(tmp_path: Path) -> None:
-    """What `solve` says of each joint with its shims; the stock is ordered from its thin end."""
-    path, out = tmp_path / "scene.toml", tmp_path / "out"
-    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS)
-    asked = ("--allow-gap", 0.03, "--stock", "0.02,0.05", "--patches", "2x1", "--taper", "--each")
-    done = harness("shim", path, *asked, "--cases", 2, "--share", 1, "--out", out)
-    assert done.exit_code in (0, 4), done.output
-    scene, study = scene_at(path), study_of(path, "2x1", ends=2)
-    cases, joints = GapCases(count=2).of(scene, "dual"), pd.read_csv(out / "joints.csv")
-    record, pieces = json.loads((out / "shim.json").read_text())["joints"], list[tuple[float, ...]]()
-    for k, joint in enumerate(record):
-        shims = [study.effect(tuple(item)) for item in joint["plan"]]
-        effects = (*(effect for effect in scene.effects if effect.kind != "initial_gap"), *shims)
-        gap = solve(with_gap(replace(scene, effects=effects), cases.load(k).g)).gap.max()
-        assert (gap <= 0.03) == joint["kept"] == joints["kept"][k]
-        for patch, *ends in joint["plan"]:
-            name = study.patches[int(patch)].name
-            assert [joints[name][k], joints[f"{name}, other end"][k]] == ends
-            pieces.append(tuple(sorted(ends)))
-    stock = pd.read_csv(out / "stock.csv")
-    columns = zip(stock["thickness_mm"], stock["thickness_end_mm"], strict=True)
-    assert dict(zip(columns, stock["pieces"], strict=True)) == Counter(pieces)
-    assert pieces
-
-
-def test_the_command_writes_both_ends_of_a_tapered_shim(tmp_path: Path) -> None:
-    path, out = tmp_path / "scene.toml", tmp_path / "out"
-    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP.replace("random", "# random") + FASTENERS)
-    asked = ("--allow-gap", 0.04, "--stock", "0.01,0.02,0.04", "--patches", "3x1", "--taper")
-    done = harness("shim", path, *asked, "--out", out)
-    assert done.exit_code in (0, 4), done.output
-    record = json.loads((out / "shim.json").read_text())
-    assert f"{record['after']['gap']:.9f}" == f"{solve(str(out / 'shimmed.toml')).gap.max():.9f}"
-    for patch in record["patches"]:
-        assert {patch["thickness_mm"], patch["thickness_end_mm"]} <= {0.0, 0.01, 0.02, 0.04}

@@ -1,7 +1,6 @@
 """Plans of fasteners that stages set and take out: the gap after the last stage, against `solve`."""
 
 import json
-import pickle
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -14,7 +13,7 @@ from small_joints import STAGED, scene_at
 
 from harness import solve
 from harness.placement.candidates import MovableFasteners, Plan, grid, plan_of, without_fasteners
-from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question, answer
+from harness.placement.session import TOLERANCE_MM, FastenerStudy, PlanSession, Question
 from harness.results import series_file
 from harness.scene.scene_file import MOVED, edited, with_fasteners
 from problems.errors import InputError
@@ -51,7 +50,7 @@ def test_a_plan_leaves_what_the_last_stage_leaves(path: Path, form: Form) -> Non
     """Proven upper bounds, and estimates from another plan."""
     movable = MovableFasteners.of(scene_at(path))
     cases = random_gaps(movable.bare, CASES, 0, form=form)
-    session = PlanSession(FastenerStudy(movable.bare, cases, form, movable))
+    session = PlanSession(FastenerStudy.of(movable, cases, form))
     for plan in ((), ((15.0, 30.0), (65.0, 20.0))):
         (outcome,) = session.answer(Question((plan,), (0, 1)))
         (estimated,) = session.answer(Question((plan,), (0, 1), base=movable.current))
@@ -69,7 +68,7 @@ def test_fasteners_lock_the_answer_that_is_proven(path: Path, form: Form) -> Non
     """To the last bit: another sum for the approach may be off by more than the bound of that answer."""
     movable = MovableFasteners.of(scene_at(path))
     cases = random_gaps(movable.bare, CASES, 0, form=form)
-    session = PlanSession(FastenerStudy(movable.bare, cases, form, movable))
+    session = PlanSession(FastenerStudy.of(movable, cases, form))
     stages = session.answers([movable.current], range(CASES), TOLERANCE_MM)
     (rivets,) = (effect for effect in movable.scene.effects if effect.name == "rivets")
     T, _ = rivets.springs(movable.scene.joint)  # type: ignore[attr-defined]
@@ -85,7 +84,7 @@ def test_a_stage_that_locks_what_is_not_proven_proves_no_plan(
 ) -> None:
     """Though the last stage is proven, for the approaches that it has been given."""
     movable = MovableFasteners.of(scene_at(path))
-    session = PlanSession(FastenerStudy(movable.bare, random_gaps(movable.bare, CASES, 0), "dual", movable))
+    session = PlanSession(FastenerStudy.of(movable, random_gaps(movable.bare, CASES, 0), "dual"))
     question = Question((movable.current,), (0, 1))
     assert max(session.answer(question)[0].largest) < 1.0
     first = session.stages.of(without_fasteners(stage_scenes(movable.scene)["tack"])).session
@@ -129,15 +128,6 @@ def test_the_plan_is_the_best_of_all(path: Path, tmp_path: Path) -> None:
         assert rows[k]["max_gap_mm"] <= gaps[best] + 2e-7
         assert list(rows[k]["stages_max_gap_mm"]) == record["stages"]
     assert "after stage release" in (out / "report" / "report.md").read_text()
-
-
-def test_a_worker_answers_the_same(path: Path) -> None:
-    """It is sent the study with the cases of the question alone, and opens the stages anew."""
-    movable = MovableFasteners.of(scene_at(path))
-    study = FastenerStudy(movable.bare, random_gaps(movable.bare, CASES, 0), "dual", movable)
-    question = Question((movable.current, ()), (1,))
-    task = replace(study, cases=study.cases.only(question.cases)), question
-    assert answer(pickle.loads(pickle.dumps(task))) == PlanSession(study).answer(question)
 
 
 def test_a_plan_without_fasteners_has_stages_without_them(path: Path, tmp_path: Path) -> None:

@@ -117,12 +117,16 @@ def test_spring_back_of_a_linear_joint() -> None:
     assert len({row["max_gap_mm"] for row, _ in results.values()}) == 2
 
 
-def test_forces_after_what_is_locked_unproven_are_not_known(
+def test_what_follows_from_what_is_locked_unproven_is_not_known(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    job = job_of(scene_at(scene_file(tmp_path)), LAWS)
+    known = results_of(job)[0].row
     monkeypatch.setattr(staged, "LIMIT_MM", 0.0)
-    results = results_of(job_of(scene_at(scene_file(tmp_path)), LAWS))
-    assert [result.row["force_error_N"] for result in results.values()] == [np.inf, np.inf]
+    unknown = results_of(job)[0].row
+    assert [known["verdict"], unknown["verdict"]] == ["within", "cannot_be_judged"]
+    assert np.isfinite([known["gap_error_mm"], known["force_error_N"]]).all()
+    assert unknown["gap_error_mm"] == unknown["force_error_N"] == np.inf
 
 
 def test_without_scatter_it_is_the_plain_series(tmp_path: Path) -> None:
@@ -178,8 +182,8 @@ def test_searches_draw_what_a_series_draws(tmp_path: Path) -> None:
     movable, patches = MovableFasteners.of(scene), patches_of(scene.joint, "1x1")
     job = job_of(scene, {name: law for name, law in LAWS.items() if not name.startswith("fasteners")})
     rows = [row for row, _ in results_of(job).values()]
-    shims = ShimStudy(last_scene(scene), job.cases, "dual", patches, (1e9, np.inf), scene)
-    tacks = FastenerStudy(movable.bare, job.cases, "dual", movable)
+    shims = ShimStudy(scene, last_scene(scene), job.cases, "dual", patches, (1e9, np.inf))
+    tacks = FastenerStudy.of(movable, job.cases, "dual")
     for study, plan in ((tacks, movable.current), (shims, ())):
         (outcome,) = PlanSession(study).answer(Question((plan,), (0, 1)))  # type: ignore[arg-type]
         assert outcome.largest == pytest.approx([row["max_gap_mm"] for row in rows], abs=2e-7)

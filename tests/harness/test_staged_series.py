@@ -5,16 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import harness
+from commands import harness, wrong_usage
 from small_joints import STAGED, scene_at, with_gap
+from strip_scene import strip_with
 
 from harness.results import series_file
 from harness.scene.solution import solve
-from harness.series import staged
 from harness.series.load_case_source import GapCases
 from harness.series.session import Job
 from harness.series.staged import StagedSession
-from harness.verification.judge import LIMIT_MM
 from problems.build import load_case
 from problems.forms import Form
 from problems.model.stage_answers import last_scene
@@ -62,36 +61,12 @@ def test_a_shim_of_a_later_stage_leaves_the_measured_gap_of_the_first(scene: Pat
     np.testing.assert_allclose(result.gap, exact.gap, rtol=0, atol=1e-6)
 
 
-def test_a_gap_after_what_is_locked_unproven_is_not_known(
-    scene: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    read = scene_at(scene)
-    job = Job(scene=read, cases=GapCases(count=1).of(last_scene(read), "dual"), form="dual", check=0)
-    known, unknown = [], []
-    for rows, limit_mm in ((known, LIMIT_MM), (unknown, 0.0)):
-        monkeypatch.setattr(staged, "LIMIT_MM", limit_mm)
-        ((result,),) = StagedSession(job).solve([0])
-        rows += [result.row["verdict"], result.row["gap_error_mm"] < 1e-7]
-    assert known == ["within", True]
-    assert unknown == ["cannot_be_judged", False]
-
-
-@pytest.mark.parametrize(
-    ("change", "options", "said"),
-    [
-        (("", ""), ("--sweep", "initial_gap.mean=0.1,0.2"), "has stages"),
-        (('kind = "initial_gap"', 'kind = "initial_gap"\nname = "gap"'), (), "a series replaces it"),
-    ],
-)
-def test_what_does_not_go_through_stages(
-    scene: Path, tmp_path: Path, change: tuple[str, str], options: tuple[str, ...], said: str
-) -> None:
-    text = STAGED.replace(*change) if change[0] else STAGED
-    if options == ():
-        text = text.replace('on = ["shim", "rivets[0:2]"]', 'on = ["gap", "shim", "rivets[0:2]"]')
-    scene.write_text(text, "utf-8")
-    done = harness(
-        "series", scene, "--cases" if not options else "--check", 2, *options, "--out", tmp_path / "s"
+def test_what_does_not_go_through_stages(scene: Path, tmp_path: Path) -> None:
+    out = "--out", tmp_path / "s"
+    assert "has stages" in wrong_usage("series", scene, "--sweep", "initial_gap.mean=0.1,0.2", *out)
+    named = (
+        ('kind = "initial_gap"', 'kind = "initial_gap"\nname = "gap"'),
+        ('on = ["shim"', 'on = ["gap", "shim"'),
     )
-    assert done.exit_code == 2
-    assert said in done.output.replace("\n", " ")
+    scene.write_text(strip_with(*named, text=STAGED), "utf-8")
+    assert "a series replaces it" in wrong_usage("series", scene, "--cases", 2, *out)

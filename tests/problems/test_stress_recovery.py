@@ -151,7 +151,7 @@ def test_a_search_for_shims_does_not_go_on_with_another_recovery_matrix(tmp_path
     """Its answers have the stresses of the first, and no key of a scene tells it from the second."""
     scenes = [scene_from(point_matrix(tmp_path / name, S, TWO)) for name, S in (("1", GOOD), ("2", 2 * GOOD))]
     one, other = (
-        ShimStudy(scene, Listed(()), "dual", (), (np.inf, 50.0), scene).identity for scene in scenes
+        ShimStudy(scene, scene, Listed(()), "dual", (), (np.inf, 50.0)).identity for scene in scenes
     )
     assert one["scene_key"] == other["scene_key"]
     assert one["stresses"] != other["stresses"]
