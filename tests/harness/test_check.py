@@ -172,23 +172,13 @@ def test_what_is_right_alone_and_wrong_after_another_case(solver: type[Solver], 
     assert f"right when solved alone, wrong {way} (others closed" in first
 
 
-def test_a_step_that_raises_is_named_with_its_line() -> None:
-    class Raises(Sound):
-        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
-            raise RuntimeError("no licence")
-
-    words = words_of(Raises, ("dual",))
-    assert "setup: raised RuntimeError: no licence" in words
-    assert "test_check.py, line" in words
-
-
 def test_an_error_within_a_library_is_named_with_the_line_that_calls_it() -> None:
     class Raises(Sound):
         def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
             return np.linalg.cholesky(-np.eye(2))
 
     words = words_of(Raises, ("dual",))
-    assert "setup: raised LinAlgError" in words
+    assert "setup: raised LinAlgError: Matrix is not positive definite" in words
     assert "test_check.py, line" in words
 
 

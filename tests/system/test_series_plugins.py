@@ -12,7 +12,7 @@ from plugin_commands import LESS_MEMORY, MORE_MEMORY, interrupt, write
 from strip_scene import write_strip
 from suite_runs import all_end
 
-from harness import GapCases, InputError, SeriesOptions, own_matrices, run_series
+from harness import InputError
 from harness.results import series_file
 from harness.series.executors import solve_isolated
 from harness.series.session import Job
@@ -95,15 +95,6 @@ def test_a_rung_of_a_ladder_is_solved(tmp_path: Path) -> None:
     done = harness(*words, "--plugin", write(tmp_path), "--solver", "mine", "--check", 0, "--threads", 1)
     assert done.exit_code == 0, done.output
     assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within"]
-
-
-def test_matrices_in_memory_are_not_sent_to_a_plug_in(tmp_path: Path) -> None:
-    scene = own_matrices([[100.0]], [[1.0]], [50.0], [0.2])
-    np.save(tmp_path / "gaps.npy", np.array([[0.1]]))
-    options = SeriesOptions(solver="mine", plugin=write(tmp_path))
-    cases = GapCases(gaps=tmp_path / "gaps.npy")
-    with pytest.raises(InputError, match="a scene that another process can read"):
-        run_series(scene, tmp_path / "out", cases, options)
 
 
 @pytest.mark.parametrize("described", ["sha256:of another numpy=={numpy}", "{files} numpy==0.1"])
