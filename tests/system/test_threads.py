@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 import threadpoolctl
 from sample_size import draws
-from small_problems import make_load, make_prepared
+from small_problems import make_load, own_arrays
 
 import harness
 from harness import LoadCase
@@ -27,9 +26,7 @@ NAMES = ("gallery/shimmed-strip", "gallery/heavy-sheet-on-tool")
 
 
 def problem(k: int) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
-    data = make_prepared(k, 4 + k % 3, tools=2)
-    load = make_load(k, data)[1]
-    return data, load, (sp.block_diag(data.assembly.K.matrices), data.assembly.A, load.f, load.g)
+    return own_arrays(k, 4 + k % 3)
 
 
 OWN = [harness.own_matrices(*problem(k)[2]) for k in range(THREADS)]
