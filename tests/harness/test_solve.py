@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from commands import harness, wrong_usage
+from commands import harness, succeeds, wrong_usage
 from matplotlib.image import imread
 from small_joints import forbid_building, two_parts
 from small_problems import solve_by_nnls
@@ -268,10 +268,10 @@ def own_scene(path: Path, contacts: int) -> Path:
 
 def test_nothing_of_an_older_answer_remains_and_what_is_not_ours_does(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert harness("solve", own_scene(tmp_path / "one.npz", 1), "--out", out).exit_code == 0
+    succeeds("solve", own_scene(tmp_path / "one.npz", 1), "--out", out)
     assert (out / "contacts.csv").exists()
     (out / "mine.txt").write_text("kept")
-    assert harness("solve", own_scene(tmp_path / "none.npz", 0), "--out", out).exit_code == 0
+    succeeds("solve", own_scene(tmp_path / "none.npz", 0), "--out", out)
     assert not (out / "contacts.csv").exists()
     assert (out / "mine.txt").read_text() == "kept"
     files = json.loads((out / "solution.json").read_text())["files"]
@@ -297,7 +297,7 @@ def test_hashes_of_inputs_are_of_the_files_as_they_were_read(
 def test_a_full_disk_leaves_the_older_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     scene = own_scene(tmp_path / "one.npz", 1)
-    assert harness("solve", scene, "--out", out).exit_code == 0
+    succeeds("solve", scene, "--out", out)
     contents = {path.name: path.read_bytes() for path in out.iterdir()}
 
     def full(*_: object) -> None:

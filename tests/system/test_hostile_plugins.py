@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tiny_joint
-from commands import harness, wrong_usage
+from commands import harness, succeeds, wrong_usage
 from plugin_commands import LESS_MEMORY, MORE_MEMORY, THREAD, interrupt, write
 from suite_runs import all_end, rows_of
 
@@ -89,8 +89,7 @@ def test_no_thread_or_fork_is_left_behind(tmp_path: Path) -> None:
     done = harness("check", "--plugin", plugin, "--time-limit", 20)
     assert (done.exit_code, done.stdout) == (0, "mine: no faults\n")
     suite = tiny_joint.write_suite(tmp_path)
-    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
-    assert done.exit_code == 0
+    succeeds("run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
@@ -100,8 +99,7 @@ def test_a_solver_that_goes_to_another_folder_is_measured(
 ) -> None:
     plugin, suite = write(tmp_path, in_solve="os.chdir('/')"), tiny_joint.write_suite(tmp_path)
     monkeypatch.chdir(tmp_path)
-    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", "out")
-    assert done.exit_code == 0, done.output
+    succeeds("run", suite, "--plugin", plugin, "--solver", "mine", "--out", "out")
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
@@ -112,8 +110,7 @@ def test_a_plug_in_that_adds_a_folder_of_code_is_the_one_described(tmp_path: Pat
     (tmp_path / "more" / "added_code.py").touch()
     plugin = write(tmp_path, f"sys.path.insert(0, {str(tmp_path / 'more')!r}); import added_code")
     suite, out = tiny_joint.write_suite(tmp_path), tmp_path / "out"
-    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", out)
-    assert done.exit_code == 0, done.output
+    succeeds("run", suite, "--plugin", plugin, "--solver", "mine", "--out", out)
     assert [row["verdict"] for row in rows_of(out)] == ["within"]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-from commands import harness
+from commands import harness, succeeds
 from plugin_commands import LESS_MEMORY, MORE_MEMORY, interrupt, write
 from strip_scene import write_strip
 from suite_runs import all_end
@@ -92,8 +92,7 @@ def test_a_rung_of_a_ladder_is_solved(tmp_path: Path) -> None:
     """The process of the plug-in makes it from its name."""
     np.save(tmp_path / "gaps.npy", np.array([[0.0], [1e-3]]))
     words = ["series", "hard/parts/two-nodes", "--gaps", tmp_path / "gaps.npy", "--out", tmp_path / "out"]
-    done = harness(*words, "--plugin", write(tmp_path), "--solver", "mine", "--check", 0, "--threads", 1)
-    assert done.exit_code == 0, done.output
+    succeeds(*words, "--plugin", write(tmp_path), "--solver", "mine", "--check", 0, "--threads", 1)
     assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within"]
 
 
@@ -120,8 +119,7 @@ def test_a_series_with_a_plug_in_that_adds_a_folder_of_code_is_solved(tmp_path: 
 def test_answers_are_proven_on_the_loads_as_they_were(tmp_path: Path) -> None:
     """Compiled code writes into arrays whatever their flags say: the bound was of the changed load case."""
     write_by_force = "load.g.flags.writeable = True; load.g[:] += 1.0"
-    done = harness(*series(tmp_path, in_solve=write_by_force))
-    assert done.exit_code == 0, done.output
+    succeeds(*series(tmp_path, in_solve=write_by_force))
     verdicts = [row["verdict"] for row in series_file.rows(tmp_path / "out")]
     assert verdicts == ["within"] * 5
 
