@@ -1,7 +1,6 @@
 """Plug-ins that misbehave: each command ends, says what happened, and leaves no process and no traceback."""
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 import tiny_joint
 from commands import harness, succeeds, wrong_usage
 from plugin_commands import LESS_MEMORY, MORE_MEMORY, THREAD, interrupt, write
-from suite_runs import all_end, rows_of
+from suite_runs import rows_of
 
 import harness.conformance.isolated as isolated
 import harness.measurement.solver_descriptions as describing
@@ -19,14 +18,6 @@ from harness.planning.suite import read_suite
 from solvers.registry import solver_version
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
-
-
-@pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A cache that marks the processes of a test, which are to end."""
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    yield
-    assert all_end(tmp_path / "cache")
 
 
 @pytest.mark.parametrize(
@@ -114,12 +105,6 @@ def test_a_plug_in_that_adds_a_folder_of_code_is_the_one_described(tmp_path: Pat
     assert [row["verdict"] for row in rows_of(out)] == ["within"]
 
 
-def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
-    with pytest.raises(InputError, match="solver mine: forms"):
-        described([("mine", {})], tmp_path / "mine.py", "test")
-
-
 def test_a_plug_in_has_the_version_of_the_distribution_that_it_names(tmp_path: Path) -> None:
     """Behind that of its own files: an upgrade outdates its rows."""
     (tmp_path / "mine.py").write_text(tiny_joint.EXACT + '\n    distribution = "numpy"\n')
@@ -127,11 +112,21 @@ def test_a_plug_in_has_the_version_of_the_distribution_that_it_names(tmp_path: P
     assert found.version == f"{solver_version('mine', tmp_path / 'mine.py')} numpy=={np.__version__}"
 
 
-def test_an_option_with_the_name_of_what_a_run_sets_is_bad_input(tmp_path: Path) -> None:
-    """The run would replace its value without a word."""
-    printing = "\n    def __init__(self, prints=True):\n        self.prints = prints\n"
-    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + printing)
-    with pytest.raises(InputError, match="solver mine: prints = 'True': Choose another name"):
+PRINTING = "\n    def __init__(self, prints=True):\n        self.prints = prints\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (tiny_joint.EXACT.replace('("dual",)', '"dual"'), "solver mine: forms"),
+        (tiny_joint.EXACT + PRINTING, "solver mine: prints = 'True': Choose another name"),
+    ],
+    ids=["forms", "prints"],
+)
+def test_what_no_solver_may_set_is_bad_input(tmp_path: Path, text: str, said: str) -> None:
+    """Forms that there are not, and an option of which the run would replace the value without a word."""
+    (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(InputError, match=said):
         described([("mine", {})], tmp_path / "mine.py", "test")
 
 

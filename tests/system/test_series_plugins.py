@@ -10,7 +10,6 @@ import pytest
 from commands import harness, succeeds
 from plugin_commands import LESS_MEMORY, MORE_MEMORY, interrupt, write
 from strip_scene import write_strip
-from suite_runs import all_end
 
 from harness import InputError
 from harness.results import series_file
@@ -20,17 +19,9 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
 from solvers.registry import solver_version
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report", "own_cache")]
 
 COUNTED = "self.count = getattr(self, 'count', 0) + 1\n        if self.count == 3: "
-
-
-@pytest.fixture(autouse=True)
-def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A cache that marks the processes of a test, which are to end."""
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    yield
-    assert all_end(tmp_path / "cache")
 
 
 def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[object]:

@@ -58,7 +58,6 @@ CALLS: dict[str, tuple[int, Callable[[int], Any]]] = {
     "solve": (8, lambda k: [(s := harness.solve(harness.own_matrices(*problem(k)[2]))).x, s.lam, s.gap]),
     "solve one object": (2, lambda k: harness.solve(OWN[k], (None, "newton")[k]).x),
     "solve a joint": (2, lambda k: harness.solve(JOINT, form=("dual", "sparse")[k]).x),
-    "solve by name": (2, lambda k: harness.solve(NAMES[k]).x),
     "judge": (8, lambda k: harness.judge(OWN[k], np.ones(10 + 2 * (k % 3))).displacement_error_mm),
     "solve_dual": (
         8,
