@@ -87,15 +87,13 @@ def test_another_program_takes_the_place_of_the_first(listed: bool, scenes: Path
 def test_a_record_of_another_program_names_nothing_to_remove(scenes: Path, tmp_path: Path) -> None:
     (tmp_path / "about.json").write_text('{"files": ["mine.mtx"]}')
     (tmp_path / "mine.mtx").write_text("mine")
-    asked = ("export", scenes / "tiny.npz", "--form", "dual", "--out", tmp_path)
-    succeeds(*asked)
+    succeeds("export", scenes / "tiny.npz", "--form", "dual", "--out", tmp_path)
     assert (tmp_path / "mine.mtx").read_text() == "mine"
 
 
 def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: Path) -> None:
     """The files alone, solved by nnls."""
-    asked = ("export", scenes / "tiny.npz", "--form", "primal", "--with-reference", "--out", tmp_path / "p")
-    succeeds(*asked)
+    succeeds("export", scenes / "tiny.npz", "--form", "primal", "--with-reference", "--out", tmp_path / "p")
     scene = read_scene(str(scenes / "tiny.npz"))
     x, lam = solve_by_nnls(prepared(scene), load_case(scene))
     found = read_problem(tmp_path / "p")
@@ -190,8 +188,7 @@ def test_displacements(name: str, shift: float, code: int, scenes: Path, answer:
 def test_an_answer_in_other_units_is_judged_by_its_millimetres(tmp_path: Path) -> None:
     """Each in its own unit: 2e-3 mm in the largest, and 1e-3 mm, a larger number, in the smallest."""
     rung, out = "hard/units/unknowns", tmp_path / "p"
-    asked = ("export", rung, "--form", "primal", "--with-reference", "--out", out)
-    succeeds(*asked)
+    succeeds("export", rung, "--form", "primal", "--with-reference", "--out", out)
     files = read_problem(out)
     x, unit = files["x"], files["unit_mm"]
     large, small = int(unit.argmax()), int(unit.argmin())

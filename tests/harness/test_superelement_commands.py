@@ -127,13 +127,10 @@ def test_two_plans_a_series_and_a_run(folder: Path, tmp_path: Path) -> None:
     (folder / "more.toml").write_text(text.replace("preload = 300.0", "preload = 600.0"))
     succeeds("solve", folder / "edited.toml", folder / "more.toml", "--out", tmp_path / "both")
     assert (tmp_path / "both" / "comparison.md").is_file()
-    options = ("--sd", 0.05, "--correlation-length", 80.0)
-    scan = folder / "scan.csv"
-    scan.write_text("x,y,gap\n10,10,0.2\n")
-    options = (*options, "--cases", 6, "--around", scan)
+    (scan := folder / "scan.csv").write_text("x,y,gap\n10,10,0.2\n")
+    options = ("--sd", 0.05, "--correlation-length", 80.0, "--cases", 6, "--around", scan)
     succeeds("series", folder / "edited.toml", *options, "--out", tmp_path / "series")
-    run = ("run", "--scene", folder / "edited.toml", "--solver", "gi", "--out", tmp_path / "run")
-    succeeds(*run)
+    succeeds("run", "--scene", folder / "edited.toml", "--solver", "gi", "--out", tmp_path / "run")
     assert (tmp_path / "run" / "report" / "report.md").is_file()
 
 
