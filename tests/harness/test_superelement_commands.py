@@ -32,9 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     distance = np.linalg.norm(nodes[:, None] - nodes, axis=2)
     springs = 30 * np.eye(66) + 200 * np.exp(-((distance / 60) ** 2))
     write_part(folder, "frame", springs, nodes)
-    succeeds(
-        "init", "--superelements", folder / "wing.npz", folder / "frame.npz", folder / "scene.toml"
-    )
+    succeeds("init", "--superelements", folder / "wing.npz", folder / "frame.npz", folder / "scene.toml")
     text = (folder / "scene.toml").read_text().replace("dofs = [3]", 'dofs = [1, 2, 3]\nrows = "table"', 1)
     (folder / "edited.toml").write_text(
         text.replace("points = [[0.0, 0.0]]", "points = [[100.0, 60.0], [290.0, 33.0]]")
