@@ -21,6 +21,13 @@ def onto(text: StringIO) -> ConsoleReporter:
     return ConsoleReporter(Console(file=text, width=200))
 
 
+def succeeds(*words: object) -> str:
+    """What a command says that ends with exit code 0."""
+    done = harness(*words)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
 def wrong_usage(*words: object) -> str:
     """What a command says of wrong usage or bad input, in one line."""
     done = harness(*words)

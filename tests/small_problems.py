@@ -5,6 +5,7 @@ min ½λᵀQλ − pᵀλ, λ ≥ 0 is min ‖Uλ − U⁻ᵀp‖, λ ≥ 0 with
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
@@ -57,6 +58,13 @@ def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[Load
     g = random.uniform(0.01, 0.5, prepared.assembly.m)
     case = LoadCase(f, g)
     return case, prepared.with_p([case])[0]
+
+
+def own_arrays(seed: int = 3, pairs: int = 6) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
+    """Two parts and two rigid supports, a load case, and both as the arguments of `own_matrices`."""
+    data = make_prepared(seed, pairs, tools=2)
+    load = make_load(seed, data)[1]
+    return data, load, (sp.block_diag(data.assembly.K.matrices), data.assembly.A, load.f, load.g)
 
 
 def solve_by_nnls(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:

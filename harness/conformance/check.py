@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.solving.solver_answer import InvalidAnswer, checked, error_text, examined, shown
-from harness.solving.solver_session import OTHER_NAME, SolverSession, replaced
+from harness.solving.solver_session import OTHER_NAME, SolverSession, given_arrays, replaced
 from harness.verification.judge import LIMIT_MM
 from problems import ROOT
 from problems.errors import InputError, refuse_text
@@ -21,7 +21,7 @@ from problems.forms.problem import in_form
 from problems.reporter import Reporter
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 
-from .known_problems import KnownCase, KnownProblem, arrays_of, known_problems
+from .known_problems import KnownCase, KnownProblem, known_problems
 
 TOLERANCE = 1e-9
 LOOSE = 1e-1  # a tolerance at which an iterative solver stops earlier than at TOLERANCE
@@ -120,7 +120,8 @@ def findings(
 
 def _check_problem(factory: Callable[[], Solver], trial: KnownProblem, form: Form) -> Iterator[Finding]:
     """Check each case with a solver of its own; then all with one solver, in each way to solve several."""
-    problem, contents = in_form(trial.prepared, form), _contents(trial)
+    problem = in_form(trial.prepared, form)
+    given = given_arrays(problem, *(case.load for case in trial.cases))
 
     def alone(case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
         return _Steps(factory(), problem, tolerance).answer(case)
@@ -142,9 +143,10 @@ def _check_problem(factory: Callable[[], Solver], trial: KnownProblem, form: For
                 words = f"right when solved alone, wrong {what} ({case.name}: {fault.wrong})"
                 yield Finding(form, trial.name, words, fix)
                 break
-    if _contents(trial) != contents:
-        fix = "Copy K, A, Q, f, g and p before writing into them"
-        yield Finding(form, trial.name, "the solver changed the arrays that it was given", fix)
+    try:
+        given.check()
+    except InvalidAnswer as fault:
+        yield Finding(form, trial.name, str(fault), "K, A, Q, f, g and p are shared")
 
 
 def inspect(answer: Answer, trial: KnownProblem, case: KnownCase, form: Form) -> Finding | None:
@@ -279,8 +281,3 @@ def _apart(one: Answer, other: Answer, trial: KnownProblem, case: KnownCase) -> 
 
 def _largest(difference: Vector) -> float:
     return float(np.abs(difference).max())
-
-
-def _contents(trial: KnownProblem) -> list[bytes]:
-    loads = [array for case in trial.cases for array in (case.load.f, case.load.g, case.load.p)]
-    return [array.tobytes() for array in (*arrays_of(trial.prepared), *loads)]

@@ -5,16 +5,14 @@ then hold by construction, and the answer is unique because K is positive defini
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from problems.forms import Form
 from problems.forms.assembly import Assembly, DualLoadCase, LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form, read_only
+from problems.forms.problem import read_only
 from problems.stiffness.operator import Stiffness
 
 DOMINANT = 2e5  # N/mm, added to the diagonal of a banded K, which makes it positive definite
@@ -85,9 +83,3 @@ def known_problems(form: Form = "dual") -> list[KnownProblem]:
         cases = tuple(known_case(random, prepared, closed, title) for title, closed in CLOSED.items())
         made.append(KnownProblem(name, prepared, cases))
     return made
-
-
-def arrays_of(prepared: Prepared) -> list[NDArray[Any]]:
-    """The arrays that a solver is given, but for the loads."""
-    A = prepared.assembly.A
-    return [*in_form(prepared, prepared.form).arrays, A.data, A.indices]

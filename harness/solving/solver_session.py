@@ -186,11 +186,12 @@ def copied(load: LoadCase) -> LoadCase:
     return read_only(replace(load, **arrays))
 
 
-def given_arrays(problem: Problem) -> GivenArrays:
-    """The arrays of a problem that a solver is given, made read-only."""
+def given_arrays(problem: Problem, *loads: LoadCase) -> GivenArrays:
+    """The arrays that a solver is given; those of the problem are made read-only."""
     protect(problem)
     A = problem.assembly.A
-    return GivenArrays([*problem.arrays, A.data, A.indices, A.indptr])
+    of_loads = [v for load in loads for v in vars(load).values() if isinstance(v, np.ndarray)]
+    return GivenArrays([*problem.arrays, A.data, A.indices, A.indptr, *of_loads])
 
 
 def protect(problem: Problem) -> None:

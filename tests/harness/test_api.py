@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 import tiny_joint
 from refusals import refusal_of
-from small_problems import make_load, make_prepared, solve_by_nnls
+from small_problems import make_load, own_arrays, solve_by_nnls
 from strip_scene import STRIP, write_strip
 
 import harness
@@ -34,18 +33,11 @@ from harness.series.session import Job
 from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
-from problems.forms.prepared import Prepared
 from problems.input.tables import TableOptions
 from problems.load_cases import Listed
 from problems.model.joint import Joint
 from problems.model.joint_model import JointModel
 from solvers.base import failed
-
-
-def matrices(seed: int = 3) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
-    data = make_prepared(seed, 6, tools=2)
-    load = make_load(seed, data)[1]
-    return data, load, (sp.block_diag(data.assembly.K.matrices), data.assembly.A, load.f, load.g)
 
 
 def test_the_names_are_offered_and_documented() -> None:
@@ -118,9 +110,9 @@ def test_all_faults_of_a_dict_are_named() -> None:
 def test_solutions_are_the_independent_answer(solver: str | None, form: Any) -> None:
     if solver == "newton" and form == "primal":
         with pytest.raises(InputError, match="newton: form = 'primal': it takes dual"):
-            solve(own_matrices(*matrices()[2]), solver, form=form)
+            solve(own_matrices(*own_arrays()[2]), solver, form=form)
         return
-    data, load, arrays = matrices()
+    data, load, arrays = own_arrays()
     x, lam = solve_by_nnls(data, load)
     solution = solve(own_matrices(*arrays), solver, form=form, tolerance=1e-10)
     assert arrays[2].flags.writeable
@@ -139,7 +131,7 @@ def test_solutions_are_the_independent_answer(solver: str | None, form: Any) -> 
 
 
 def test_an_x_from_elsewhere_is_judged() -> None:
-    data, load, own = matrices()
+    data, load, own = own_arrays()
     scene = own_matrices(*own)
     x, lam = solve_by_nnls(data, load)
     right, wrong = judge(scene, x, lam), judge(scene, x + 1e-6)
@@ -154,7 +146,7 @@ def test_an_x_from_elsewhere_is_judged() -> None:
 
 
 def test_plain_arrays_are_copied_and_checked() -> None:
-    data, load, _ = matrices()
+    data, load, _ = own_arrays()
     Q, p = data.Q, load.p
     before = Q.copy(), p.copy()
     assert solve_dual(Q, p).x is None
@@ -203,7 +195,7 @@ class Idle(Solver):
 
 
 def test_a_solver_object_is_judged_and_its_nonsense_named() -> None:
-    scene = own_matrices(*matrices()[2])
+    scene = own_matrices(*own_arrays()[2])
     idle = solve(scene, Idle())
     assert (idle.status, idle.judgement.verdict) == ("solved", "outside")
     assert idle.error_bound_mm > 0.01
@@ -223,27 +215,20 @@ def test_a_series_from_python_has_limits_that_stop(tmp_path: Path, options: dict
         harness.run_series(write_strip(tmp_path), tmp_path / "out", options=harness.SeriesOptions(**options))
 
 
-def test_limits_that_are_no_numbers_are_refused_from_python() -> None:
-    scene = own_matrices(*matrices()[2])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e-9, 0.0])
+def test_a_tolerance_or_limit_that_no_answer_meets_is_refused_from_python(value: float) -> None:
+    scene = own_matrices(*own_arrays()[2])
     for refused in (
-        lambda: solve(scene, limit_s=np.nan),
-        lambda: judge(scene, np.zeros(14), limit_mm=np.nan),
-        lambda: solve_series(scene, [], limit_mm=np.nan),
+        lambda: solve(scene, tolerance=value),
+        lambda: solve_dual(np.eye(2), np.ones(2), tolerance=value),
+        lambda: solve_series(scene, [], tolerance=value),
+        lambda: solve_series(scene, [], limit_mm=value),
+        lambda: judge(scene, np.zeros(14), limit_mm=value),
     ):
-        with pytest.raises(InputError, match="nan"):
+        with pytest.raises(InputError, match=rf" = {value}: must be positive and finite"):
             refused()
-
-
-@pytest.mark.parametrize("tolerance", [np.nan, np.inf, -1e-9, 0.0])
-def test_a_tolerance_that_no_answer_meets_is_refused_from_python(tolerance: float) -> None:
-    scene = own_matrices(*matrices()[2])
-    for refused in (
-        lambda: solve(scene, tolerance=tolerance),
-        lambda: solve_dual(np.eye(2), np.ones(2), tolerance=tolerance),
-        lambda: solve_series(scene, [], tolerance=tolerance),
-    ):
-        with pytest.raises(InputError, match=rf": tolerance = {tolerance}: must be positive and finite"):
-            refused()
+    with pytest.raises(InputError, match="nan"):
+        solve(scene, limit_s=np.nan)
 
 
 def test_a_text_is_no_list(tmp_path: Path) -> None:
@@ -260,7 +245,7 @@ def test_a_text_is_no_list(tmp_path: Path) -> None:
 
 
 def test_an_answer_that_is_changed_leaves_the_reference() -> None:
-    answer = solve(own_matrices(*matrices()[2]))
+    answer = solve(own_matrices(*own_arrays()[2]))
     x, lam = answer.x, answer.problem.reference.lam.copy()
     answer.x[:] = 1.0
     answer.lam[:] = 1.0
@@ -297,12 +282,12 @@ def test_the_plugin_of_a_series_is_a_text_or_a_path(tmp_path: Path, monkeypatch:
     harness.run_series(strip, "out", few, options, report=False)
     assert jobs[0].plugin == tmp_path / "exact.py"
     with pytest.raises(InputError, match=r"--plugin: scene = .*`export` makes one"):
-        harness.run_series(own_matrices(*matrices()[2]), "out", few, options)
+        harness.run_series(own_matrices(*own_arrays()[2]), "out", few, options)
 
 
 @pytest.mark.parametrize(("solver", "form"), [("newton", "dual"), ("gi", "dual"), ("gi", "primal")])
 def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
-    data, _, arrays = matrices()
+    data, _, arrays = own_arrays()
     loads = [make_load(seed, data)[0] for seed in range(4)]
     results = list(solve_series(own_matrices(*arrays), loads, solver, form=form, check=2))
     assert [result.row["case"] for result in results] == [0, 1, 2, 3]
@@ -317,7 +302,7 @@ def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
 
 
 def test_a_series_of_no_load_cases_has_no_results() -> None:
-    assert not list(solve_series(own_matrices(*matrices()[2]), Listed(())))
+    assert not list(solve_series(own_matrices(*own_arrays()[2]), Listed(())))
 
 
 def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from harness.conformance.check import run
-from harness.conformance.known_problems import known_problems
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
@@ -172,23 +171,13 @@ def test_what_is_right_alone_and_wrong_after_another_case(solver: type[Solver], 
     assert f"right when solved alone, wrong {way} (others closed" in first
 
 
-def test_a_step_that_raises_is_named_with_its_line() -> None:
-    class Raises(Sound):
-        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
-            raise RuntimeError("no licence")
-
-    words = words_of(Raises, ("dual",))
-    assert "setup: raised RuntimeError: no licence" in words
-    assert "test_check.py, line" in words
-
-
 def test_an_error_within_a_library_is_named_with_the_line_that_calls_it() -> None:
     class Raises(Sound):
         def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
             return np.linalg.cholesky(-np.eye(2))
 
     words = words_of(Raises, ("dual",))
-    assert "setup: raised LinAlgError" in words
+    assert "setup: raised LinAlgError: Matrix is not positive definite" in words
     assert "test_check.py, line" in words
 
 
@@ -240,17 +229,3 @@ def test_load_cases_at_once_in_another_order() -> None:
     assert "wrong when solved at once by `batched`" in words_of(Turned, ("dual",))
     assert "0 answers to" in words_of(Short, ("dual",))
     assert "batched: raised IndexError" in words_of(Raising, ("dual",))
-
-
-def test_known_answers_fulfil_the_optimality_conditions() -> None:
-    for trial in known_problems():
-        prepared, assembly = trial.prepared, trial.prepared.assembly
-        for case in trial.cases:
-            gap = case.load.g - assembly.A.T @ case.x
-            force = assembly.K.multiply(case.x) - case.load.f + assembly.A @ case.lam
-            assert np.abs(force).max() < 1e-9
-            assert gap.min() > -1e-12
-            assert case.lam.min() >= 0
-            assert abs(case.lam @ gap) < 1e-9
-            again = prepared.recover(case.lam, LoadCase(case.load.f, case.load.g))
-            np.testing.assert_allclose(again, case.x, atol=1e-11)

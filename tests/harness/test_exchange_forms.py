@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 import scipy.sparse as sp
 import tiny_joint
-from commands import harness, wrong_usage
+from commands import harness, succeeds, wrong_usage
 from small_problems import solve_by_nnls
 from strip_scene import write_strip
 
@@ -48,8 +48,7 @@ def dense(M: Any) -> np.ndarray:
 @pytest.mark.parametrize("form", ["primal", "dual", "sparse"])
 def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Path) -> None:
     source = scenes / "strip.toml"
-    done = harness("export", source, "--form", form, "--with-reference", "--out", tmp_path / "p")
-    assert done.exit_code == 0, done.output
+    succeeds("export", source, "--form", form, "--with-reference", "--out", tmp_path / "p")
     files = read_problem(tmp_path / "p")
     problem = in_form(prepared(read_scene(str(source)), form=form), form)
     (load,) = problem.loads([load_case(read_scene(str(source)), form)])
@@ -73,7 +72,7 @@ def test_another_program_takes_the_place_of_the_first(listed: bool, scenes: Path
     listed : whether about.json names the files of the first, which version 0.3.0 did not. It had no unit_mm.
     """
     out, words = tmp_path / "p", ("export", scenes / "tiny.npz", "--form")
-    assert harness(*words, "primal", "--with-reference", "--out", out).exit_code == 0
+    succeeds(*words, "primal", "--with-reference", "--out", out)
     (out / "mine.txt").write_text("mine")
     about = json.loads((out / "about.json").read_text())
     assert sorted(path.name for path in out.iterdir()) == sorted(["mine.txt", *about["files"]])
@@ -81,22 +80,20 @@ def test_another_program_takes_the_place_of_the_first(listed: bool, scenes: Path
         (out / "unit_mm.mtx").unlink()
         del about["files"]
     (out / "about.json").write_text(json.dumps(about))
-    assert harness(*words, "dual", "--out", out).exit_code == 0
+    succeeds(*words, "dual", "--out", out)
     assert {path.name for path in out.iterdir()} == {"P.mtx", "q.mtx", "lb.mtx", "about.json", "mine.txt"}
 
 
 def test_a_record_of_another_program_names_nothing_to_remove(scenes: Path, tmp_path: Path) -> None:
     (tmp_path / "about.json").write_text('{"files": ["mine.mtx"]}')
     (tmp_path / "mine.mtx").write_text("mine")
-    asked = ("export", scenes / "tiny.npz", "--form", "dual", "--out", tmp_path)
-    assert harness(*asked).exit_code == 0
+    succeeds("export", scenes / "tiny.npz", "--form", "dual", "--out", tmp_path)
     assert (tmp_path / "mine.mtx").read_text() == "mine"
 
 
 def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: Path) -> None:
     """The files alone, solved by nnls."""
-    asked = ("export", scenes / "tiny.npz", "--form", "primal", "--with-reference", "--out", tmp_path / "p")
-    assert harness(*asked).exit_code == 0
+    succeeds("export", scenes / "tiny.npz", "--form", "primal", "--with-reference", "--out", tmp_path / "p")
     scene = read_scene(str(scenes / "tiny.npz"))
     x, lam = solve_by_nnls(prepared(scene), load_case(scene))
     found = read_problem(tmp_path / "p")
@@ -109,8 +106,8 @@ def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: P
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_one_npz_holds_the_same(form: Form, scenes: Path, tmp_path: Path) -> None:
     asked = ("export", scenes / "strip.toml", "--form", form, "--with-reference", "--out")
-    assert harness(*asked, tmp_path / "p").exit_code == 0
-    assert harness(*asked, tmp_path / "p.npz").exit_code == 0
+    succeeds(*asked, tmp_path / "p")
+    succeeds(*asked, tmp_path / "p.npz")
     files = read_problem(tmp_path / "p")
     with np.load(tmp_path / "p.npz") as archive:
         arrays = dict(archive)
@@ -147,7 +144,7 @@ def test_the_reader_in_cpp_agrees_with_the_one_in_python(scenes: Path, tmp_path:
     subprocess.run(command, check=True)
     for form in ("dual", "sparse"):
         asked = ("export", scenes / "strip.toml", "--form", form, "--with-reference", "--out")
-        assert harness(*asked, tmp_path / form).exit_code == 0
+        succeeds(*asked, tmp_path / form)
         said = subprocess.run([compiled, tmp_path / form], capture_output=True, text=True, check=True).stdout
         unknowns, residual = map(float, said.split())
         assert unknowns == len(read_problem(tmp_path / form)["q"])
@@ -191,8 +188,7 @@ def test_displacements(name: str, shift: float, code: int, scenes: Path, answer:
 def test_an_answer_in_other_units_is_judged_by_its_millimetres(tmp_path: Path) -> None:
     """Each in its own unit: 2e-3 mm in the largest, and 1e-3 mm, a larger number, in the smallest."""
     rung, out = "hard/units/unknowns", tmp_path / "p"
-    asked = ("export", rung, "--form", "primal", "--with-reference", "--out", out)
-    assert harness(*asked).exit_code == 0
+    succeeds("export", rung, "--form", "primal", "--with-reference", "--out", out)
     files = read_problem(out)
     x, unit = files["x"], files["unit_mm"]
     large, small = int(unit.argmax()), int(unit.argmin())
@@ -208,18 +204,17 @@ def test_an_answer_in_other_units_is_judged_by_its_millimetres(tmp_path: Path) -
 def test_forces_alone_are_judged_by_their_displacements(scenes: Path, answer: Any, tmp_path: Path) -> None:
     _, lam = answer
     path = written(tmp_path / "lam.csv", lam, "lam")
-    done = harness("judge", path, scenes / "tiny.npz")
-    assert done.exit_code == 0, done.output
-    assert "largest unbalanced force" in done.stdout
+    told = succeeds("judge", path, scenes / "tiny.npz")
+    assert "largest unbalanced force" in told
     written(path, lam + 1e-3 * (lam > 0), "lam")
     assert harness("judge", path, scenes / "tiny.npz").exit_code == 1
 
 
 def test_tables_of_solve_are_answers(scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
-    assert harness("solve", scenes / "strip.toml", "--out", tmp_path).exit_code == 0
+    succeeds("solve", scenes / "strip.toml", "--out", tmp_path)
     for name in ("nodes.csv", "contacts.csv", "solution.npz"):
-        assert harness("judge", tmp_path / name, scenes / "strip.toml").exit_code == 0
+        succeeds("judge", tmp_path / name, scenes / "strip.toml")
     header, *lines = (tmp_path / "nodes.csv").read_text().splitlines()
     (tmp_path / "nodes.csv").write_text(
         "\n".join([header, *sorted(lines, key=lambda line: line.split(",")[-1])])
@@ -327,8 +322,7 @@ def test_an_mps_file_has_the_program_and_its_optimum(
     import highspy
 
     source, out = scenes / "strip.toml", tmp_path / name
-    done = harness("export", source, "--form", form, "--out", out)
-    assert done.exit_code == 0, done.output
+    succeeds("export", source, "--form", form, "--out", out)
     P, q, G, h, lower = read_mps(out)
     problem = in_form(prepared(read_scene(str(source)), form=form), form)
     (load,) = problem.loads([load_case(read_scene(str(source)), form)])
@@ -358,7 +352,7 @@ def test_a_suite_is_a_test_set(scenes: Path, tmp_path: Path) -> None:
     suite = 'scenes = ["tiny.npz", "strip.toml"]\n[[solver]]\nname = "gi"\n'
     (scenes / "pair.toml").write_text(suite)
     out = tmp_path / "pair.parquet"
-    assert harness("export", scenes / "pair.toml", "--form", "primal", "--out", out).exit_code == 0
+    succeeds("export", scenes / "pair.toml", "--form", "primal", "--out", out)
     said = subprocess.run(["sha256sum", "-c", f"{out.name}.sha256"], cwd=tmp_path, capture_output=True)
     assert said.returncode == 0
     assert parquet.ParquetFile(out).num_row_groups == 2

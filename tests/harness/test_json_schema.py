@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import harness, wrong_usage
+from commands import harness, succeeds, wrong_usage
 from published_runs import DIRECTORIES
 
 from harness.planning.json_schema import FILE, schema_of
@@ -103,7 +103,7 @@ def test_its_keys_are_those_that_are_read() -> None:
 
 
 def test_the_command_writes_and_prints_it(tmp_path: Path) -> None:
-    assert harness("schema", "suite", "--out", tmp_path / "suite.json").exit_code == 0
+    succeeds("schema", "suite", "--out", tmp_path / "suite.json")
     printed = json.loads(harness("schema", "suite").stdout)
     assert printed == json.loads((tmp_path / "suite.json").read_text("utf-8")) == SUITE.schema
 

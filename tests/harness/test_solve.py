@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from commands import harness, wrong_usage
+from commands import harness, succeeds, wrong_usage
 from matplotlib.image import imread
 from small_joints import forbid_building, two_parts
 from small_problems import solve_by_nnls
@@ -233,21 +233,14 @@ def test_a_vtu_file_reads_back(solved: tuple[dict[str, Any], Path], tmp_path: Pa
         np.testing.assert_array_equal(field, np.concatenate([gap, np.minimum(gap, to_tool)]))
 
 
-def test_the_forces_on_the_nodes_are_A_lambda() -> None:
-    """A = (2, −3, 0): entries other than ±1 count."""
+@pytest.mark.parametrize(("lam", "forces"), [(1.25, [2.5, -3.75, 0.0]), (np.nan, [np.nan, np.nan, 0.0])])
+def test_the_forces_on_the_nodes_are_A_lambda(lam: float, forces: list[float]) -> None:
+    """A = (2, −3, 0): entries other than ±1 count, and unknown forces are no zeros."""
     record = {"n": 3, "m": 1, "parts": [{"start": 0, "stop": 3}]}
-    data = {"A_data": [2.0, -3.0], "A_indices": [0, 1], "A_indptr": [0, 2], "lam": [1.25]}
+    data = {"A_data": [2.0, -3.0], "A_indices": [0, 1], "A_indptr": [0, 2], "lam": [lam]}
     data |= {"nodes": np.zeros((3, 2)), "x": np.zeros(3), "gap_before": [1.0], "gap_after": [0.0]}
     given = {name: np.array(values) for name, values in data.items()}
-    assert grid_with_fields(record, given)[2]["contact_force_N"].tolist() == [2.5, -3.75, 0.0]
-
-
-def test_forces_on_nodes_that_are_not_known_are_no_zeros() -> None:
-    record = {"n": 2, "m": 1, "parts": [{"start": 0, "stop": 2}]}
-    data = {"A_data": [1.0], "A_indices": [0], "A_indptr": [0, 1], "lam": [np.nan]}
-    data |= {"nodes": np.zeros((2, 2)), "x": np.zeros(2), "gap_before": [1.0], "gap_after": [0.0]}
-    given = {name: np.array(values) for name, values in data.items()}
-    assert np.isnan(grid_with_fields(record, given)[2]["contact_force_N"]).tolist() == [True, False]
+    np.testing.assert_array_equal(grid_with_fields(record, given)[2]["contact_force_N"], forces)
 
 
 def test_without_meshio_the_page_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -275,10 +268,10 @@ def own_scene(path: Path, contacts: int) -> Path:
 
 def test_nothing_of_an_older_answer_remains_and_what_is_not_ours_does(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert harness("solve", own_scene(tmp_path / "one.npz", 1), "--out", out).exit_code == 0
+    succeeds("solve", own_scene(tmp_path / "one.npz", 1), "--out", out)
     assert (out / "contacts.csv").exists()
     (out / "mine.txt").write_text("kept")
-    assert harness("solve", own_scene(tmp_path / "none.npz", 0), "--out", out).exit_code == 0
+    succeeds("solve", own_scene(tmp_path / "none.npz", 0), "--out", out)
     assert not (out / "contacts.csv").exists()
     assert (out / "mine.txt").read_text() == "kept"
     files = json.loads((out / "solution.json").read_text())["files"]
@@ -304,7 +297,7 @@ def test_hashes_of_inputs_are_of_the_files_as_they_were_read(
 def test_a_full_disk_leaves_the_older_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     scene = own_scene(tmp_path / "one.npz", 1)
-    assert harness("solve", scene, "--out", out).exit_code == 0
+    succeeds("solve", scene, "--out", out)
     contents = {path.name: path.read_bytes() for path in out.iterdir()}
 
     def full(*_: object) -> None:

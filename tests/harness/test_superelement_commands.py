@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import harness
+from commands import harness, succeeds
 from superelements import flat, stiffnesses, two_plates, write_part
 
 from harness import solve
@@ -32,10 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     distance = np.linalg.norm(nodes[:, None] - nodes, axis=2)
     springs = 30 * np.eye(66) + 200 * np.exp(-((distance / 60) ** 2))
     write_part(folder, "frame", springs, nodes)
-    done = harness(
-        "init", "--superelements", folder / "wing.npz", folder / "frame.npz", folder / "scene.toml"
-    )
-    assert done.exit_code == 0, done.output
+    succeeds("init", "--superelements", folder / "wing.npz", folder / "frame.npz", folder / "scene.toml")
     text = (folder / "scene.toml").read_text().replace("dofs = [3]", 'dofs = [1, 2, 3]\nrows = "table"', 1)
     (folder / "edited.toml").write_text(
         text.replace("points = [[0.0, 0.0]]", "points = [[100.0, 60.0], [290.0, 33.0]]")
@@ -46,9 +43,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def answered(folder: Path) -> tuple[Path, str]:
     """The directory of the answer, with its pictures, and what `solve` says."""
-    done = harness("solve", folder / "edited.toml", "--out", folder / "answer", "--allow-gap", 5.0)
-    assert done.exit_code == 0, done.output
-    return folder / "answer", done.output
+    told = succeeds("solve", folder / "edited.toml", "--out", folder / "answer", "--allow-gap", 5.0)
+    return folder / "answer", told
 
 
 def test_the_starter_needs_one_edit(folder: Path) -> None:
@@ -64,7 +60,7 @@ def test_the_starter_needs_one_edit(folder: Path) -> None:
 @pytest.mark.parametrize("name", ["PROFILE", "$FILE", 'PARTS "A"', "TITLE\\n", "a\nb = 1", "\x7f\U0001f600"])
 def test_a_part_may_have_any_name(name: str, tmp_path: Path) -> None:
     scene = tmp_path / "my scene.toml"
-    assert harness("init", "--superelements", tmp_path / f"{name}.npz", scene).exit_code == 0
+    succeeds("init", "--superelements", tmp_path / f"{name}.npz", scene)
     text = scene.read_text("utf-8")
     assert f"solve '{scene}' --allow-gap" in text
     written = tomllib.loads(text)
@@ -78,16 +74,14 @@ def test_the_starter_names_files_through_links(tmp_path: Path) -> None:
     (tmp_path / "far" / "away").mkdir(parents=True)
     (tmp_path / "here").symlink_to(tmp_path / "far" / "away")
     (tmp_path / "wing.npz").touch()
-    done = harness("init", "--superelements", tmp_path / "wing.npz", tmp_path / "here/scene.toml")
-    assert done.exit_code == 0, done.output
+    succeeds("init", "--superelements", tmp_path / "wing.npz", tmp_path / "here/scene.toml")
     (part,) = tomllib.loads((tmp_path / "here/scene.toml").read_text("utf-8"))["joint"]["part"]
     assert (part["superelement"], part["nodes"]) == ("../../wing.npz", "../../wing.csv")
     assert (tmp_path / "here" / part["superelement"]).is_file()
 
 
 def test_validate_says_what_there_is(folder: Path) -> None:
-    done = harness("validate", folder / "edited.toml")
-    assert done.exit_code == 0, done.output
+    told = succeeds("validate", folder / "edited.toml")
     for said in (
         "135 unknowns, 45 contact nodes",
         "45 nodes of wing",
@@ -95,7 +89,7 @@ def test_validate_says_what_there_is(folder: Path) -> None:
         "Points are given along",
         "First rows of K of wing: node 1 x, node 1 y, node 1 z, node 2 x",
     ):
-        assert said in done.output
+        assert said in told
 
 
 def test_solve_writes_pictures_tables_and_forces(
@@ -129,18 +123,12 @@ def test_solve_writes_pictures_tables_and_forces(
 def test_two_plans_a_series_and_a_run(folder: Path, tmp_path: Path) -> None:
     text = (folder / "edited.toml").read_text()
     (folder / "more.toml").write_text(text.replace("preload = 300.0", "preload = 600.0"))
-    done = harness("solve", folder / "edited.toml", folder / "more.toml", "--out", tmp_path / "both")
-    assert done.exit_code == 0, done.output
+    succeeds("solve", folder / "edited.toml", folder / "more.toml", "--out", tmp_path / "both")
     assert (tmp_path / "both" / "comparison.md").is_file()
-    options = ("--sd", 0.05, "--correlation-length", 80.0)
-    scan = folder / "scan.csv"
-    scan.write_text("x,y,gap\n10,10,0.2\n")
-    options = (*options, "--cases", 6, "--around", scan)
-    done = harness("series", folder / "edited.toml", *options, "--out", tmp_path / "series")
-    assert done.exit_code == 0, done.output
-    run = ("run", "--scene", folder / "edited.toml", "--solver", "gi", "--out", tmp_path / "run")
-    done = harness(*run)
-    assert done.exit_code == 0, done.output
+    (scan := folder / "scan.csv").write_text("x,y,gap\n10,10,0.2\n")
+    options = ("--sd", 0.05, "--correlation-length", 80.0, "--cases", 6, "--around", scan)
+    succeeds("series", folder / "edited.toml", *options, "--out", tmp_path / "series")
+    succeeds("run", "--scene", folder / "edited.toml", "--solver", "gi", "--out", tmp_path / "run")
     assert (tmp_path / "run" / "report" / "report.md").is_file()
 
 
@@ -148,10 +136,8 @@ def test_two_plans_a_series_and_a_run(folder: Path, tmp_path: Path) -> None:
 def test_what_is_exported_is_the_same_problem(
     folder: Path, answered: tuple[Path, str], tmp_path: Path
 ) -> None:
-    done = harness("export", folder / "edited.toml", "--format", "npz", "--out", tmp_path / "out.npz")
-    assert done.exit_code == 0, done.output
-    done = harness("solve", tmp_path / "out.npz", "--out", tmp_path / "again")
-    assert done.exit_code == 0, done.output
+    succeeds("export", folder / "edited.toml", "--format", "npz", "--out", tmp_path / "out.npz")
+    succeeds("solve", tmp_path / "out.npz", "--out", tmp_path / "again")
     with (
         np.load(tmp_path / "again" / "solution.npz") as again,
         np.load(answered[0] / "solution.npz") as first,
@@ -163,8 +149,7 @@ def test_what_is_exported_is_the_same_problem(
 @pytest.mark.usefixtures("without_pictures")
 def test_the_example_is_solved_and_made_again(tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "examples" / "own-parts"
-    done = harness("solve", example / "joint.toml", "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
+    succeeds("solve", example / "joint.toml", "--out", tmp_path / "out")
     made = runpy.run_path(str(example / "make_parts.py"))
     for name in ("wing", "frame"):
         assert (example / f"{name}.npz").stat().st_size < 300_000
@@ -204,9 +189,8 @@ def test_the_bound_is_that_of_the_displacements_shown(tmp_path: Path) -> None:
 def test_an_answer_along_inclined_normals_is_judged_by_its_unknowns(tmp_path: Path) -> None:
     """One unknown per node, which is not the displacement that nodes.csv has."""
     scene, out = write_tilted(tmp_path, (0.04, 0.0), [3]), tmp_path / "out"
-    assert harness("solve", scene, "--out", out).exit_code == 0
-    done = harness("judge", out / "solution.npz", scene)
-    assert done.exit_code == 0, done.output
+    succeeds("solve", scene, "--out", out)
+    succeeds("judge", out / "solution.npz", scene)
     done = harness("judge", out / "nodes.csv", scene)
     assert (done.exit_code, "`unknowns` of solution.npz" in " ".join(done.stderr.split())) == (2, True)
-    assert harness("judge", out / "contacts.csv", scene).exit_code == 0
+    succeeds("judge", out / "contacts.csv", scene)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import harness, wrong_usage
+from commands import harness, succeeds, wrong_usage
 from matplotlib.image import imread
 from small_joints import two_parts
 from superelements import write_part
@@ -56,7 +56,7 @@ def test_springs_and_contacts_balance_what_the_parts_without_them_resist(tmp_pat
     """K₀, A, f₀ of the scene without springs: K₀x + Aλ − f₀ is at each tied node the pull of its spring."""
     tied = write(tmp_path / "tied.toml", JOINT + FASTENERS + SPRINGS)
     bare = write(tmp_path / "bare.toml", JOINT + FASTENERS)
-    assert harness("solve", tied, "--out", tmp_path / "out").exit_code == 0
+    succeeds("solve", tied, "--out", tmp_path / "out")
     with np.load(tmp_path / "out" / "solution.npz") as saved:
         x, lam = saved["x"], saved["lam"]
     scene = read_scene(str(bare))
@@ -81,9 +81,8 @@ def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path, monkeypatch:
     monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     first = write(tmp_path / "before.toml", JOINT)
     second = write(tmp_path / "after.toml", JOINT + FASTENERS + SPRINGS)
-    done = harness("solve", first, second, "--out", tmp_path / "both", "--allow-gap", 0.29)
-    assert done.exit_code == 0, done.output  # the first alone has a gap of 0.3 mm
-    assert "-0 " not in done.output
+    told = succeeds("solve", first, second, "--out", tmp_path / "both", "--allow-gap", 0.29)
+    assert "-0 " not in told
     gaps = gaps_of(tmp_path / "both")
     table = rows(tmp_path / "both" / "contacts.csv")
     np.testing.assert_array_equal([float(row["change_mm"]) for row in table], gaps[1] - gaps[0])
@@ -212,10 +211,9 @@ def test_the_page_of_two_meshes_says_what_each_answer_says(tmp_path: Path) -> No
 def test_the_starter_is_a_scene_that_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("report.writers.answer_report.answer_figures", lambda *_: {})
     path = tmp_path / "new" / "joint.toml"
-    assert harness("init", path).exit_code == 0
-    assert harness("validate", path).exit_code == 0
-    done = harness("solve", path, "--out", tmp_path / "out", "--allow-gap", 0.05)
-    assert done.exit_code == 0, done.output
+    succeeds("init", path)
+    succeeds("validate", path)
+    succeeds("solve", path, "--out", tmp_path / "out", "--allow-gap", 0.05)
     assert json.loads((tmp_path / "out" / "solution.json").read_text())["qp"]
     comments = [line for line in path.read_text().splitlines() if line.startswith("# kind")]
     assert len(comments) >= 3

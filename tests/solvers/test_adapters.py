@@ -1,11 +1,9 @@
 from typing import Any
 
-import clarabel
 import numpy as np
 import piqp
 import pytest
 import qpsolvers
-import scipy.linalg as sla
 import scipy.sparse as sp
 from proxsuite import proxqp
 from small_problems import make_load, make_prepared, make_strips, problem_in, solve_by_nnls
@@ -16,9 +14,8 @@ from harness.solving.solver_session import SolverSession
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
-from solvers.adapter import clipped, dense, upper_triangle
+from solvers.adapter import clipped
 from solvers.base import DENSE_FORMS, FORMS, Answer, Form
-from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
 from solvers.libraries.proxqp import ProxQp
 from solvers.libraries.qpsolvers import TIME_LIMIT, TOLERANCE
 from solvers.registry import make_solver
@@ -188,19 +185,6 @@ def test_highs_accepts_the_settings_it_is_given() -> None:
 # What the adapters share.
 
 
-def test_matrices_in_the_libraries_formats() -> None:
-    random = np.random.default_rng(14)
-    blocks = [B + B.T for B in (random.standard_normal((k, k)) for k in (3, 1, 4))]
-    whole = sla.block_diag(*blocks)
-    upper = upper_triangle(blocks)
-    assert upper.has_sorted_indices
-    assert upper.nnz == 6 + 1 + 10
-    np.testing.assert_array_equal(upper.toarray(), np.triu(whole))
-    np.testing.assert_array_equal(dense(blocks), whole)
-    assert dense(blocks).flags.f_contiguous
-    assert np.shares_memory(dense(blocks[:1]), blocks[0])
-
-
 def test_small_negative_multipliers_become_zero_and_what_is_not_finite_is_no_answer() -> None:
     lam = np.array([1.0, -1e-10, -1e-3])
     got = clipped(Answer("solved", lam), 1e-9)
@@ -208,11 +192,6 @@ def test_small_negative_multipliers_become_zero_and_what_is_not_finite_is_no_ans
     assert lam[1] == -1e-10  # the library's own array is left alone
     assert clipped(Answer("solved", np.array([1.0, np.nan])), 1e-9).status == "failed"
     assert clipped(Answer("solved", np.ones(2), np.array([np.inf])), 1e-9).lam is None
-
-
-def test_almost_solved_is_not_solved() -> None:
-    assert CLARABEL_STATUS[str(clarabel.SolverStatus.AlmostSolved)] == "inaccurate"
-    assert [key for key, status in CLARABEL_STATUS.items() if status == "solved"] == ["Solved"]
 
 
 @pytest.mark.parametrize("name", ["piqp", "clarabel"])

@@ -17,8 +17,6 @@ from problems.forms.problem import in_form
 from problems.forms.sprung_stiffness import SprungStiffness
 from problems.ladders.rough import brick_stiffness
 from problems.stiffness.operator import Stiffness
-from solvers.algorithms.block_pivoting import TrialSolution
-from solvers.algorithms.closed_sets import ClosedSets
 from solvers.algorithms.newton_sweeps import Sweeps
 from solvers.base import WarmStart
 from solvers.registry import make_solver
@@ -60,18 +58,6 @@ def test_a_border_of_one_contact_twice_is_refused_as_such_a_set_is() -> None:
     np.testing.assert_array_equal(factor.solve(C, np.ones(20)), C)
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         factor.solve(~C | C, np.ones(20))
-
-
-def test_a_set_starts_from_any_point() -> None:
-    """λ is zero off the set and y on it, and y = Qλ − p, wherever λ was."""
-    Q, random = definite(SIZE, 2), np.random.default_rng(3)
-    sets, p = ClosedSets(Q), random.standard_normal(SIZE)
-    for C in changing_sets(random):
-        lam = random.uniform(0, 1, SIZE) * (random.random(SIZE) < 0.5)
-        trial = sets.set(TrialSolution(lam, Q @ lam - p, 0.0), C)
-        assert not trial.lam[~C].any()
-        assert not trial.y[C].any()
-        np.testing.assert_allclose(trial.y, Q @ trial.lam - p, atol=1e-9)
 
 
 def test_a_border_that_has_lost_its_digits_gives_way_to_a_new_factor(monkeypatch: pytest.MonkeyPatch) -> None:

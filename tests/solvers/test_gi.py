@@ -1,4 +1,4 @@
-"""Goldfarb–Idnani: its factor, its pivots, and its answers on both forms."""
+"""Goldfarb–Idnani: its pivots, and its answers on both forms."""
 
 from dataclasses import replace
 
@@ -12,41 +12,8 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.stiffness.operator import Stiffness
 from solvers.algorithms.goldfarb_idnani import goldfarb_idnani
-from solvers.algorithms.growing_factor import GrowingFactor
 from solvers.base import Answer
 from solvers.methods.gi import GoldfarbIdnani
-
-
-def grow(G: np.ndarray, members: list[int]) -> GrowingFactor:
-    factor = GrowingFactor(len(G))
-    for count, k in enumerate(members):
-        d = factor.solve_transposed(G[members[:count], k])
-        factor.extend(d[:, None], np.array([[np.sqrt(G[k, k] - d @ d)]]))
-    return factor
-
-
-def test_members_come_and_go_many_times() -> None:
-    G = definite(200, seed=2)
-    rng = np.random.default_rng(3)
-    members = [int(k) for k in rng.permutation(200)[:150]]
-    factor = grow(G, members)
-    for _ in range(120):
-        outside = sorted(set(range(200)) - set(members))
-        if rng.random() < 0.5 and outside:
-            k = int(rng.choice(outside))
-            d = factor.solve_transposed(G[members, k])
-            factor.extend(d[:, None], np.array([[np.sqrt(G[k, k] - d @ d)]]))
-            members.append(k)
-        else:
-            position = int(rng.integers(len(members)))
-            factor.delete(position)
-            del members[position]
-    wanted = G[np.ix_(members, members)]
-    np.testing.assert_allclose(factor.R.T @ factor.R, wanted, atol=1e-10 * abs(G).max())
-    assert not np.tril(factor.R, -1).any()
-    b = np.arange(1.0, len(members) + 1)
-    np.testing.assert_allclose(factor.R @ factor.solve(b), b, atol=1e-8)
-    np.testing.assert_allclose(factor.R.T @ factor.solve_transposed(b), b, atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -71,15 +38,6 @@ def test_the_limit_on_pivots_is_kept_and_reported() -> None:
     result = goldfarb_idnani(G, lambda u: (-np.ones(50) + G @ u, np.ones(50)), 1e-12, 5)
     assert result.status == "iteration_limit"
     assert result.pivots == 5
-
-
-@pytest.mark.parametrize("pairs", [1, 40])
-def test_the_inverse_is_full_and_symmetric(pairs: int) -> None:
-    prepared = make_prepared(1, pairs)
-    state = GoldfarbIdnani().prepare(in_form(prepared, "dual"))
-    np.testing.assert_allclose(state.G @ prepared.Q, np.eye(pairs), atol=1e-9)
-    np.testing.assert_array_equal(state.G, state.G.T)
-    assert state.G.flags.f_contiguous
 
 
 def test_duplicate_contacts_do_not_hinder_the_primal_form() -> None:

@@ -133,16 +133,6 @@ def test_algorithm_3_takes_two_newton_steps() -> None:
     np.testing.assert_allclose(found.y, wanted.y, rtol=1e-12)
 
 
-def test_the_textbook_corrector_meets_the_second_order_products() -> None:
-    """With full steps its new products would be σμ up to the third-order part of the corrector."""
-    state, point = newton(*drawn(10, 4))
-    dlam, dy = state.direction(point, -point.lam * point.y, "predictor")
-    np.testing.assert_allclose(point.lam * dy + point.y * dlam, -point.lam * point.y, rtol=1e-8)
-    found = mehrotra(state, point)
-    assert found.mu < point.mu
-    assert state.system.factorisations == 1  # one matrix for both directions
-
-
 @pytest.mark.parametrize("system", ["V", "direct"])
 def test_a_start_anew_with_shorter_steps_frees_what_has_jammed(
     system: str, monkeypatch: pytest.MonkeyPatch

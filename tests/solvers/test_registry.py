@@ -131,7 +131,6 @@ def test_plugin_errors_are_one_clear_message(tmp_path: Path, text: str, words: l
     ("name", "options", "file", "text", "message"),
     [
         ("no", {}, "no.py", None, "existing Python file"),
-        ("piqp", {}, "piqp.py", GOOD, "rename the file"),
         ("mine", {"sweeps": -1}, "mine.py", REFUSING, "sweeps must be positive"),
     ],
 )

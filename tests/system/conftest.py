@@ -1,10 +1,12 @@
-"""A browser without a window or a network, one for all tests of pages."""
+"""A browser without a window or a network, one for all tests of pages; a cache of a test's own."""
 
 import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from suite_runs import all_end
 
 FLAGS = (
     *("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync"),
@@ -31,3 +33,11 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
         yield started
     finally:
         started.quit()
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A cache that marks the processes of a test, which are to end."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+    yield
+    assert all_end(tmp_path / "cache")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import harness
+from commands import succeeds
 from strip_scene import write_strip
 
 from harness.cli.app import app
@@ -110,7 +110,7 @@ def test_optimised_python_writes_the_same_answer(tmp_path: Path, monkeypatch: py
         return entry
 
     monkeypatch.setattr(page_figures, "load_or_make", copied)
-    assert harness("solve", write_strip(tmp_path), "--out", tmp_path / "plain").exit_code == 0
+    succeeds("solve", write_strip(tmp_path), "--out", tmp_path / "plain")
     done = run(tmp_path, "-OO", "-c", HELP_AND_SOLVE, PYTHONDONTWRITEBYTECODE="")
     helped, *_ = done.stdout.split("\n---\n")
     assert " ".join(docstring(series).replace("\b", "").split()) in " ".join(helped.split())

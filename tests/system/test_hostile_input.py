@@ -172,5 +172,5 @@ def test_loads_whose_displacements_overflow_are_refused(form: str, tmp_path: Pat
     K, A = 1e-3 * np.array([[2.0, 1.0], [1.0, 2.0]]), np.ones((2, 1))  # x = ±inf, p = inf − inf
     np.savez(tmp_path / "own.npz", K=K, A=A, g=np.ones(1), f=np.full(2, 1.7e308))
     given = ["solve", str(tmp_path / "own.npz"), "--form", form, "--out", str(tmp_path / "out")]
-    assert "finite displacements" in wrong_usage(*given)
+    assert "largest |f| = 1.7e+308: loads with finite displacements" in wrong_usage(*given)
     assert not (tmp_path / "out").exists()

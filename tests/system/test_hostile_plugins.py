@@ -1,15 +1,14 @@
 """Plug-ins that misbehave: each command ends, says what happened, and leaves no process and no traceback."""
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tiny_joint
-from commands import harness, wrong_usage
+from commands import harness, succeeds, wrong_usage
 from plugin_commands import LESS_MEMORY, MORE_MEMORY, THREAD, interrupt, write
-from suite_runs import all_end, rows_of
+from suite_runs import rows_of
 
 import harness.conformance.isolated as isolated
 import harness.measurement.solver_descriptions as describing
@@ -19,14 +18,6 @@ from harness.planning.suite import read_suite
 from solvers.registry import solver_version
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
-
-
-@pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A cache that marks the processes of a test, which are to end."""
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    yield
-    assert all_end(tmp_path / "cache")
 
 
 @pytest.mark.parametrize(
@@ -89,8 +80,7 @@ def test_no_thread_or_fork_is_left_behind(tmp_path: Path) -> None:
     done = harness("check", "--plugin", plugin, "--time-limit", 20)
     assert (done.exit_code, done.stdout) == (0, "mine: no faults\n")
     suite = tiny_joint.write_suite(tmp_path)
-    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
-    assert done.exit_code == 0
+    succeeds("run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
@@ -100,8 +90,7 @@ def test_a_solver_that_goes_to_another_folder_is_measured(
 ) -> None:
     plugin, suite = write(tmp_path, in_solve="os.chdir('/')"), tiny_joint.write_suite(tmp_path)
     monkeypatch.chdir(tmp_path)
-    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", "out")
-    assert done.exit_code == 0, done.output
+    succeeds("run", suite, "--plugin", plugin, "--solver", "mine", "--out", "out")
     assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
@@ -112,15 +101,8 @@ def test_a_plug_in_that_adds_a_folder_of_code_is_the_one_described(tmp_path: Pat
     (tmp_path / "more" / "added_code.py").touch()
     plugin = write(tmp_path, f"sys.path.insert(0, {str(tmp_path / 'more')!r}); import added_code")
     suite, out = tiny_joint.write_suite(tmp_path), tmp_path / "out"
-    done = harness("run", suite, "--plugin", plugin, "--solver", "mine", "--out", out)
-    assert done.exit_code == 0, done.output
+    succeeds("run", suite, "--plugin", plugin, "--solver", "mine", "--out", out)
     assert [row["verdict"] for row in rows_of(out)] == ["within"]
-
-
-def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(tiny_joint.EXACT.replace('("dual",)', '"dual"'))
-    with pytest.raises(InputError, match="solver mine: forms"):
-        described([("mine", {})], tmp_path / "mine.py", "test")
 
 
 def test_a_plug_in_has_the_version_of_the_distribution_that_it_names(tmp_path: Path) -> None:
@@ -130,11 +112,21 @@ def test_a_plug_in_has_the_version_of_the_distribution_that_it_names(tmp_path: P
     assert found.version == f"{solver_version('mine', tmp_path / 'mine.py')} numpy=={np.__version__}"
 
 
-def test_an_option_with_the_name_of_what_a_run_sets_is_bad_input(tmp_path: Path) -> None:
-    """The run would replace its value without a word."""
-    printing = "\n    def __init__(self, prints=True):\n        self.prints = prints\n"
-    (tmp_path / "mine.py").write_text(tiny_joint.EXACT + printing)
-    with pytest.raises(InputError, match="solver mine: prints = 'True': Choose another name"):
+PRINTING = "\n    def __init__(self, prints=True):\n        self.prints = prints\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (tiny_joint.EXACT.replace('("dual",)', '"dual"'), "solver mine: forms"),
+        (tiny_joint.EXACT + PRINTING, "solver mine: prints = 'True': Choose another name"),
+    ],
+    ids=["forms", "prints"],
+)
+def test_what_no_solver_may_set_is_bad_input(tmp_path: Path, text: str, said: str) -> None:
+    """Forms that there are not, and an option of which the run would replace the value without a word."""
+    (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(InputError, match=said):
         described([("mine", {})], tmp_path / "mine.py", "test")
 
 

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-from commands import harness
+from commands import harness, succeeds
 from plugin_commands import LESS_MEMORY, MORE_MEMORY, interrupt, write
 from strip_scene import write_strip
-from suite_runs import all_end
 
-from harness import GapCases, InputError, SeriesOptions, own_matrices, run_series
+from harness import InputError
 from harness.results import series_file
 from harness.series.executors import solve_isolated
 from harness.series.session import Job
@@ -20,17 +19,9 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
 from solvers.registry import solver_version
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_report", "own_cache")]
 
 COUNTED = "self.count = getattr(self, 'count', 0) + 1\n        if self.count == 3: "
-
-
-@pytest.fixture(autouse=True)
-def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A cache that marks the processes of a test, which are to end."""
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    yield
-    assert all_end(tmp_path / "cache")
 
 
 def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[object]:
@@ -92,18 +83,8 @@ def test_a_rung_of_a_ladder_is_solved(tmp_path: Path) -> None:
     """The process of the plug-in makes it from its name."""
     np.save(tmp_path / "gaps.npy", np.array([[0.0], [1e-3]]))
     words = ["series", "hard/parts/two-nodes", "--gaps", tmp_path / "gaps.npy", "--out", tmp_path / "out"]
-    done = harness(*words, "--plugin", write(tmp_path), "--solver", "mine", "--check", 0, "--threads", 1)
-    assert done.exit_code == 0, done.output
+    succeeds(*words, "--plugin", write(tmp_path), "--solver", "mine", "--check", 0, "--threads", 1)
     assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within"]
-
-
-def test_matrices_in_memory_are_not_sent_to_a_plug_in(tmp_path: Path) -> None:
-    scene = own_matrices([[100.0]], [[1.0]], [50.0], [0.2])
-    np.save(tmp_path / "gaps.npy", np.array([[0.1]]))
-    options = SeriesOptions(solver="mine", plugin=write(tmp_path))
-    cases = GapCases(gaps=tmp_path / "gaps.npy")
-    with pytest.raises(InputError, match="a scene that another process can read"):
-        run_series(scene, tmp_path / "out", cases, options)
 
 
 @pytest.mark.parametrize("described", ["sha256:of another numpy=={numpy}", "{files} numpy==0.1"])
@@ -129,8 +110,7 @@ def test_a_series_with_a_plug_in_that_adds_a_folder_of_code_is_solved(tmp_path: 
 def test_answers_are_proven_on_the_loads_as_they_were(tmp_path: Path) -> None:
     """Compiled code writes into arrays whatever their flags say: the bound was of the changed load case."""
     write_by_force = "load.g.flags.writeable = True; load.g[:] += 1.0"
-    done = harness(*series(tmp_path, in_solve=write_by_force))
-    assert done.exit_code == 0, done.output
+    succeeds(*series(tmp_path, in_solve=write_by_force))
     verdicts = [row["verdict"] for row in series_file.rows(tmp_path / "out")]
     assert verdicts == ["within"] * 5
 
