@@ -167,7 +167,7 @@ def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
     path = tmp_path / "three.toml"
     path.write_text(f"{two_parts()}[[joint.part]]{third}{gaps}{FASTENERS}")
     explorer = Explorer(scene_at(path), "dual")
-    answer = explorer.proven(explorer.answer(Settings.of(scene_at(path))))
+    answer = explorer.proven(explorer.answer(explorer.settings))
     assert abs(answer.gap - solve(str(path)).gap).max() <= 1e-7
     assert answer.settings.means == (0.01, 0.7)
 
@@ -213,9 +213,8 @@ points = [[150.0, 25.0]]
 def page_of(path: Path, text: str) -> Any:
     """A page of a scene as in a browser, without one."""
     path.write_text(text)
-    explorer, settings = Explorer(scene_at(path), "dual"), Settings.of(scene_at(path))
-    document = Document()
-    return explore_page.Page(explorer, str(path), 0.05, explorer.answer(settings), document)
+    explorer = Explorer(scene_at(path), "dual")
+    return explore_page.Page(explorer, str(path), 0.05, explorer.answer(explorer.settings), Document())
 
 
 def dragged(page: Any, x: float, y: float) -> None:
@@ -329,8 +328,8 @@ def test_a_browser_in_the_terminal_gets_the_page(path: Path, monkeypatch: pytest
 
 
 def test_the_outcome_in_words(path: Path) -> None:
-    explorer, settings = Explorer(scene_at(path), "dual"), Settings.of(scene_at(path))
-    answer = explorer.answer(settings)
+    explorer = Explorer(scene_at(path), "dual")
+    answer = explorer.answer(explorer.settings)
     places, largest = explorer.data.assembly.contact_nodes, float(answer.gap.max())
     assert ">FAIL<" in explore_page.outcome(answer, places, largest / 2)
     assert ">PASS<" in explore_page.outcome(answer, places, largest * 2)
