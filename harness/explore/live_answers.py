@@ -244,7 +244,8 @@ class Explorer:
         def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, LiveAnswer]:
             session, start = next(sessions), next(earlier)
             load = session.load(locked(part, approaches[:, 0]).effects, start)
-            lam, gap = session.solved(load, PROVEN_MM if proven else TOLERANCE_MM, start)
+            tolerance, sweeps = PROVEN_MM if proven else TOLERANCE_MM, session.sweeps
+            lam, gap = sweeps.vectors(sweeps.solved(load, tolerance, start))
             x, error, bound_mm = np.zeros(len(load.f)), None, 0.0
             if proven:
                 x, gap, error, bound_mm = session.proven(load, lam)
@@ -286,10 +287,6 @@ class _Session(StiffnessSession):
         """f and g of one effect; of None, zeros."""
         load = load_case(self.scene, self.form, [] if effect is None else [effect])
         return load.f, load.g
-
-    def solved(self, load: DualLoadCase, tolerance: float, start: DualStart | None) -> tuple[Vector, Vector]:
-        """λ (m,) N and the gaps (m,) mm."""
-        return self.sweeps.vectors(self.sweeps.solved(load, tolerance, start))
 
     def proven(self, load: DualLoadCase, lam: Vector) -> tuple[Vector, Vector, float, float]:
         """x and the gaps (m,) that belong to λ, mm, and the largest errors of a gap and of x, mm."""

@@ -69,6 +69,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
     """
     problem, judgement = solution.problem, solution.judgement
     scene, data, reference = solution.scene, problem.prepared, problem.reference
+    from_files = isinstance(scene, MatricesScene | JointScene) and not is_of_plates(scene)  # the entries of K
     return {
         "method": solution.method,
         "status": solution.status,
@@ -91,7 +92,7 @@ def recorded(solution: Solution, built: set[Stage], solver: str | None) -> dict[
         **layout(problem.scene, data.assembly),
         "fasteners": list(fastener_forces(problem.scene, solution.x)),
         **({"stages": [_stage(stage) for stage in solution.stages]} if solution.stages else {}),
-        "digits": digits_sentence(problem, solved=True)[0] if _is_given(scene) else None,
+        "digits": digits_sentence(problem, solved=True)[0] if from_files else None,
         "skipped": list(_skipped(solution, built, solver)),
         "steps": solution.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
@@ -134,11 +135,6 @@ def summary(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
         away = f"{error:.1e} mm from the answer {which}"
         text = f"{record['status']}, {away}: {record['verdict']} {LIMIT_MM:g} mm"
     yield f"{record['method']}: {text}.", "green" if record["verdict"] == "within" else "red"
-
-
-def _is_given(scene: Scene) -> bool:
-    """Whether the entries of its K were read from files."""
-    return isinstance(scene, MatricesScene) or (isinstance(scene, JointScene) and not is_of_plates(scene))
 
 
 def is_of_plates(scene: Scene) -> bool:

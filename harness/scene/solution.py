@@ -15,7 +15,7 @@ from harness.planning.form_choice import Choice, chosen_form
 from harness.solving.solver_session import answer_of, form_of
 from harness.verification.assess import GapError, error_bound
 from harness.verification.judge import LIMIT_MM, Judgement
-from harness.verification.reference_problem import ReferenceProblem, open_stage
+from harness.verification.reference_problem import ReferenceProblem, open_problem
 from problems.errors import Fault, InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Matrix, Vector
@@ -262,10 +262,10 @@ def _solved(
     clock: _Clock,
     like: ReferenceProblem | None = None,
 ) -> Solution:
-    """The judged answer to a scene without stages. like : see `open_stage`."""
+    """The judged answer to a scene without stages. like : see `open_problem`."""
     reporter, step = clock.reporter, clock.step
     with step("matrices, loads and gaps"):
-        problem = open_stage(scene, choice.form, reporter, limit_s, like)
+        problem = open_problem(scene, choice.form, reporter, limit_s, like)
         problem.prepared.assembly.K.ensure_factored()
         free = problem.prepared.assembly.K.solve(problem.load.f)
         p = problem.prepared.assembly.A.T @ free - problem.load.g  # as `Prepared.overlap`

@@ -69,7 +69,7 @@ def validate(scene: Source, *, reporter: Reporter = SILENT) -> Size | None:
             raise InputError(faults)
     if isinstance(read, JointScene) and isinstance(read.joint, Joint):
         assert size is not None
-        _plates(read, size, console)
+        _plates(read, read.joint, size, console)
     elif isinstance(read, JointScene):
         _superelements(read, console)
     else:
@@ -77,13 +77,21 @@ def validate(scene: Source, *, reporter: Reporter = SILENT) -> Size | None:
     return size
 
 
-def _plates(scene: JointScene, size: Size, console: Console) -> None:
+def _plates(scene: JointScene, joint: Joint, size: Size, console: Console) -> None:
     """Print parts, contacts and effects, and the memory of either form."""
     physical = physical_memory_mib()
     form = chosen_form(scene, FORMS, None).form
     console.print(f"{scene.name}: {scene.title}. Fine.")
     print_unusual(scene, console)
-    console.print(_contents(scene))
+    table = Table("what", "how many", title="What will be built")
+    for part in joint.part:
+        table.add_row(
+            f"part {part.name}", f"{joint.plate(part).size} unknowns, condensed onto {joint.node_count}"
+        )
+    nx, ny = joint.junction.nodes
+    for first, second in joint.pairs:
+        table.add_row(f"contact {first} – {second}", f"{joint.node_count} node pairs, {nx} × {ny}")
+    console.print(_with_effects(table, scene))
     contacts = counted(size.m, "contact")
     console.print(f"n = {size.n} unknowns, m = {contacts}; this machine has {physical} MiB.")
     cached = "; the assembly is in the cache" if size.stored else ""
@@ -139,19 +147,6 @@ def print_unusual(scene: Scene, console: Console) -> None:
     """Print what may be, but is rarely meant."""
     for sentence in scene.unusual:
         console.print(Text(f"{sentence}.", style="yellow"))
-
-
-def _contents(scene: JointScene) -> Table:
-    joint = scene.joint
-    assert isinstance(joint, Joint)
-    nx, ny = joint.junction.nodes
-    table = Table("what", "how many", title="What will be built")
-    for part in joint.part:
-        plate = joint.plate(part)
-        table.add_row(f"part {part.name}", f"{plate.size} unknowns, condensed onto {joint.node_count}")
-    for first, second in joint.pairs:
-        table.add_row(f"contact {first} – {second}", f"{joint.node_count} node pairs, {nx} × {ny}")
-    return _with_effects(table, scene)
 
 
 def _with_effects(table: Table, scene: JointScene) -> Table:

@@ -132,25 +132,25 @@ def gate(
     if not folder.is_dir():
         raise InputError.one("DIR", "directory", str(folder), "no such directory; `run` makes one")
     sides = [folder] if base is None else [folder, base]
-    inputs = [path for side in sides for files in MEASURED for path in side.glob(files)]
     for option, factor, usual in (("--margin", margin, MARGIN), ("--max-slowdown", max_slowdown, None)):
         if factor != usual and base is None:
             raise InputError.one(option, "factor", factor, "needs --baseline DIR")
         if factor is not None and not factor >= 1:
             raise InputError.one(option, "factor", factor, "1 or larger")
-    named = {"--json": json_file, "--junit": junit_file}
-    outputs = {option: Path(file) if file else None for option, file in named.items()}
-    refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])
     made = valid_rows(folder / records.MEASUREMENTS, GATED, NEEDED)
     rows = {row["key"]: row for row in counting(made) if row["gated"]}
-    refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
+    inputs = [path for side in sides for files in MEASURED for path in side.glob(files)]
+    inputs += [*(side / "suite.toml" for side in sides), *(Path(str(row["source"])) for row in rows.values())]
+    named = {"--json": json_file, "--junit": junit_file}
+    outputs = {option: Path(file) for option, file in named.items() if file}
+    refuse_outputs(outputs, inputs)
     standard = read_baseline(base, margin, str(folder), rows.values(), max_slowdown) if base else None
     findings = [*judged(rows, folder, reference_limit_s, standard), *never_measured(rows, made, folder)]
     code, sentences = concluded(findings, standard)
     if json_file:
-        write_json(Path(json_file), folder, findings, code)
+        write_json(outputs["--json"], folder, findings, code)
     if junit_file:
-        write_junit(Path(junit_file), findings)
+        write_junit(outputs["--junit"], findings)
     return GateOutcome(findings, code, sentences)
 
 

@@ -38,7 +38,7 @@ class ReferenceProblem:
     limit_s : after it no further candidate for the reference is tried. case : the number of the load case in
     a series; None for the scene's own. first : candidates that are tried before the in-house methods.
     locks_proven : whether the answers of earlier stages, in which fasteners lock, are proven; if not, nor is
-    the reference. scene_key : that of the scene before its files were read; none of a stage alone.
+    the reference. scene_key : that of the scene before its files were read.
     """
 
     scene: Scene
@@ -112,33 +112,26 @@ class ReferenceProblem:
 
 
 def open_problem(
-    scene: Scene, form: Form = "dual", reporter: Reporter = SILENT, limit_s: float | None = None
-) -> ReferenceProblem:
-    """Open or build the problem of a scene, or of its last stage; see `open_stage`. Raises InputError."""
-    key = scene.key  # its files may change when they have been read
-    last, locks_proven = last_stage(scene, limit_s)
-    opened = open_stage(last, form, reporter, limit_s)
-    return replace(opened, scene=scene, locks_proven=locks_proven, scene_key=key)
-
-
-def open_stage(
     scene: Scene,
-    form: Form,
+    form: Form = "dual",
     reporter: Reporter = SILENT,
     limit_s: float | None = None,
     like: ReferenceProblem | None = None,
 ) -> ReferenceProblem:
-    """Open or build a scene without stages. Raises InputError.
+    """Open or build the problem of a scene, or of its last stage. Raises InputError.
 
     form : the form of the answers; in the sparse form, x has an entry per unknown of the model. like : a
     problem in this form whose matrices are taken, with their factors, if they are those of the scene.
     """
     if limit_s is not None and not limit_s >= 0:
         raise InputError.one("--reference-limit", "seconds", limit_s, "0 or larger")
-    shared = like is not None and adopts_model(scene, like.scene)
-    data = like.prepared if like is not None and shared else prepared(scene, reporter, form)
+    key = scene.key  # its files may change when they have been read
+    last, locks_proven = last_stage(scene, limit_s)
+    shared = like is not None and adopts_model(last, like.scene)
+    data = like.prepared if like is not None and shared else prepared(last, reporter, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
-    return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
+    load = load_case(last, form)
+    return ReferenceProblem(scene, data, load, form, limit_s, locks_proven=locks_proven, scene_key=key)
 
 
 def last_stage(scene: Scene, limit_s: float | None = None) -> tuple[Scene, bool]:
@@ -159,7 +152,7 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> tuple[Scene, bool]
 
     def solve(part: JointScene, approaches: Matrix) -> tuple[Elongations, None]:
         nonlocal like
-        like = open_stage(locked(part, approaches[:, 0]), form, limit_s=limit_s, like=like)
+        like = open_problem(locked(part, approaches[:, 0]), form, limit_s=limit_s, like=like)
         answer, at_junction = like.reference, like.prepared.assembly.at_junction
 
         def elongations(T: sp.csc_array) -> Matrix:
