@@ -30,6 +30,7 @@ from PIL import Image
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
 from harness.results import records, series_file
+from harness.results.counted_rows import counting
 from harness.results.provenance import ROOT, provenance
 from harness.results.schema import OWNERS, ROUND, VERDICTS
 from harness.results.schema import SERIES as SERIES_FILE
@@ -40,6 +41,7 @@ from report.document.numbers import counted, listed
 from report.results.reader import read
 from report.sections.series_throughput import compared
 from report.sections.time_to_solution import against_ours, how_fast_table, ours_and_others
+from solvers.registry import owner_of
 from studies.paper.__main__ import write as write_study
 from studies.smaller_results import drop_gaps, pack
 
@@ -62,7 +64,8 @@ NAMES = (
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
 #: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.
 KEPT_KIB = 3800
-WITH_LOGS = ("default", "speed")  # the suites whose solvers' logs are published
+#: The suites with logs: those of the rows that count, of solvers that are not ours.
+WITH_LOGS = ("default", "speed")
 COLOURS = 256
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
@@ -206,11 +209,12 @@ def slim(picture: Path) -> None:
 
 
 def _unwanted(directory: Path) -> Iterator[Path]:
-    """What is not published: locks, the scenes' arrays, answers that are large, and logs of most suites."""
+    """What is not published: locks, the scenes' arrays, answers that are large, and most logs."""
     yield from directory.glob("**/*.lock")
     yield from directory.glob("scenes")
-    if directory.name not in WITH_LOGS:
-        yield from directory.glob("logs")
+    rows = counting(rows_of(directory)) if directory.name in WITH_LOGS else []
+    logs = {directory / str(row.get("log")) for row in rows if owner_of(row["solver"]) != OWNERS[0]}
+    yield from (log for log in directory.glob("logs/*") if log not in logs)
     if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_KIB * 2**10:
         yield directory / "answers"
 

@@ -111,8 +111,8 @@ def test_scenes_large_answers_and_most_logs_are_left_out(
     monkeypatch.setattr(published, "WITH_LOGS", ("large",))
     for name, size in (("small", 1000), ("large", published.KEPT_KIB * 2**10 + 1)):
         folder = tmp_path / name
-        measured(folder, row())
-        for file in ("answers/a.npz", "answers/.lock", ".lock", "scenes/a.npz", "logs/a.txt"):
+        measured(folder, row(), row(minute=1) | {"solver": "osqp", "log": "logs/a.txt"})
+        for file in ("answers/a.npz", "answers/.lock", ".lock", "scenes/a.npz", "logs/a.txt", "logs/b.txt"):
             (folder / file).parent.mkdir(exist_ok=True)
             (folder / file).write_bytes(bytes(10 if file == ".lock" else size))
         published.publish(name, folder)

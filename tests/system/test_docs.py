@@ -248,7 +248,7 @@ def test_what_is_published_in_git_is_small() -> None:
     if not files:
         pytest.skip("no clone with git")
     assert len(files) <= 400
-    assert sum(path.stat().st_size for path in files) <= 17e6
+    assert sum(path.stat().st_size for path in files) <= 20e6
     shown = {
         (page.parent / picture).resolve()
         for page in [*PAGES, *(path for path in files if path.suffix == ".md")]
