@@ -212,7 +212,7 @@ def _unwanted(directory: Path) -> Iterator[Path]:
     """What is not published: locks, the scenes' arrays, answers that are large, and most logs."""
     yield from directory.glob("**/*.lock")
     yield from directory.glob("scenes")
-    rows = counting(rows_of(directory)) if directory.name in WITH_LOGS else []
+    rows = counting([*map(dict, rows_of(directory))]) if directory.name in WITH_LOGS else []
     logs = {directory / str(row.get("log")) for row in rows if owner_of(row["solver"]) != OWNERS[0]}
     yield from (log for log in directory.glob("logs/*") if log not in logs)
     if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_KIB * 2**10:
