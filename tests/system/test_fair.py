@@ -15,10 +15,11 @@ from harness.measurement.suite_run import ROUND_LASTS
 from harness.planning.plan import HALF_DECADES, expand
 from harness.planning.suite import read_written
 from harness.planning.tolerance_search import DECADE, EXCEEDED, in_a_good_form
+from harness.results.counted_rows import counting
 from harness.results.schema import STATUSES
 from problems.random_scenes import SIZES
 from solvers.registry import make_solver, modules, owner_of
-from studies.publish import NAMES, PUBLISHED
+from studies.publish import NAMES, PUBLISHED, WITH_LOGS
 
 ROOT = Path(__file__).parents[2]
 FAIR = (ROOT / "docs/fair.md").read_text("utf-8")
@@ -149,6 +150,14 @@ def test_versions_and_commands(suite: str) -> None:
     rows = rows_of(suite)
     assert all(row["solver_version"] and row["commit"] for row in rows)
     assert len({row["key"] for row in rows}) == len(rows)
+
+
+@pytest.mark.parametrize("suite", WITH_LOGS)
+def test_logs_are_published(suite: str) -> None:
+    others = (row for row in counting(rows_of(suite)) if owner_of(row["solver"]) != "ours")
+    logs = {row["log"] for row in others} - {None}
+    assert logs
+    assert all((PUBLISHED / suite / log).is_file() for log in logs)
 
 
 def test_three_figures() -> None:
