@@ -12,11 +12,10 @@ from small_joints import JOINT, make_scene, with_gap
 from strip_scene import write_strip
 from superelements import scene_from, with_bay
 
-from problems.build import load_case, prepared
+from problems.build import load_case
 from problems.effects.fasteners import Fasteners
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.errors import InputError
-from problems.forms.prepared import Prepared
 from problems.input.tables import TableOptions
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
@@ -25,6 +24,7 @@ from problems.load_cases.sweep import keys_of, sweep
 from problems.model.scene import JointScene, Scene
 from problems.scene_files import read_scene
 
+M = 45  # contacts of the strip
 RANDOM = "random = { sd = 0.2, correlation_length = 100.0, seed = 7 }"
 
 
@@ -33,18 +33,11 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return read_scene(str(write_strip(tmp_path_factory.mktemp("strip"))))
 
 
-@pytest.fixture(scope="module")
-def data(scene: Scene) -> Prepared:
-    return prepared(scene)
-
-
-def gaps_of(cases: LoadCases, data: Prepared) -> np.ndarray:
+def gaps_of(cases: LoadCases) -> np.ndarray:
     return np.array([cases.load(k).g for k in range(cases.count)])
 
 
-def test_a_random_case_is_a_scene_with_the_seed_of_its_row(
-    scene: Scene, data: Prepared, tmp_path: Path
-) -> None:
+def test_a_random_case_is_a_scene_with_the_seed_of_its_row(scene: Scene, tmp_path: Path) -> None:
     cases = random_gaps(scene, 20, seed=3)
     for k in (0, 7, 19):
         seed = cases.parameters(k)["gap_seed"]
@@ -65,10 +58,10 @@ def test_around_a_measured_gap_the_mean_is_zero(tmp_path: Path) -> None:
     assert "--mean" not in said
 
 
-def test_a_random_case_depends_on_seed_and_number_alone(scene: Scene, data: Prepared) -> None:
+def test_a_random_case_depends_on_seed_and_number_alone(scene: Scene) -> None:
     few, many = random_gaps(scene, 3, seed=3), random_gaps(scene, 300, seed=3)
     many.load(250)
-    np.testing.assert_array_equal(gaps_of(few, data)[2], many.load(2).g)
+    np.testing.assert_array_equal(gaps_of(few)[2], many.load(2).g)
     np.testing.assert_array_equal(many.load(250).g, pickle.loads(pickle.dumps(many)).load(250).g)
     assert few.key == many.key != random_gaps(scene, 3, seed=4).key
     drawn = {many.load(k).g.tobytes() for k in range(300)}
@@ -77,13 +70,13 @@ def test_a_random_case_depends_on_seed_and_number_alone(scene: Scene, data: Prep
     assert many.load(0).f is many.load(1).f
 
 
-def test_the_statistics_of_the_random_gaps(scene: Scene, data: Prepared) -> None:
+def test_the_statistics_of_the_random_gaps(scene: Scene) -> None:
     """Mean, standard deviation and correlation over 2000 cases, each within four standard errors."""
     count, sd, length = 2000, 0.3, 80.0
-    gaps = gaps_of(random_gaps(scene, count, 1, mean=0.5, sd=sd, correlation_length=length), data)
+    gaps = gaps_of(random_gaps(scene, count, 1, mean=0.5, sd=sd, correlation_length=length))
     assert abs(gaps.mean(axis=0) - 0.5).max() < 4 * sd / np.sqrt(count)
     assert abs(gaps.std(axis=0) / sd - 1).max() < 4 / np.sqrt(2 * count)
-    nodes = data.assembly.contact_nodes
+    nodes = scene.joint.nodes
     found = np.corrcoef(gaps.T)[0]
     wanted = np.exp(-0.5 * (np.linalg.norm(nodes - nodes[0], axis=1) / length) ** 2)
     assert abs(found - wanted).max() < 4 / np.sqrt(count)
@@ -101,30 +94,24 @@ def test_the_field_comes_from_the_options_where_the_scene_has_none(tmp_path: Pat
         random_gaps(bare, 5, 0, sd=-0.1, correlation_length=50.0)
 
 
-def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
+def test_own_matrices_take_a_table_and_have_no_random_field(tmp_path: Path) -> None:
     own_scene = read_scene(str(tiny_joint.write_problem(tmp_path / "own.npz")))
     with pytest.raises(InputError, match="--gaps"):
         random_gaps(own_scene, 5, 0)
-    table = tmp_path / "gaps.csv"
-    np.savetxt(table, np.full((2, 10), 0.25), delimiter=",")
-    case = measured_gaps(own_scene, table).load(1)
-    np.testing.assert_array_equal(case.g, np.full(10, 0.25))
-    np.testing.assert_array_equal(case.f, np.load(tmp_path / "own.npz", data)["f"])
-
-
-def test_a_mark_of_own_matrices_is_no_gap(tmp_path: Path) -> None:
-    """Without places no other gap takes its place."""
-    own_scene = read_scene(str(tiny_joint.write_problem(tmp_path / "own.npz")))
     gaps = np.full((2, 10), 0.25)
-    gaps[1, 3] = 9999
+    np.savetxt(tmp_path / "gaps.csv", gaps, delimiter=",")
+    case = measured_gaps(own_scene, tmp_path / "gaps.csv").load(1)
+    np.testing.assert_array_equal(case.g, gaps[1])
+    np.testing.assert_array_equal(case.f, np.load(tmp_path / "own.npz")["f"])
+    gaps[1, 3] = 9999  # without places no other gap takes its place
     np.save(tmp_path / "gaps.npy", gaps)
     with pytest.raises(InputError, match="case 1, contact 3 = nan"):
         measured_gaps(own_scene, tmp_path / "gaps.npy", options=TableOptions(missing=(9999,)))
 
 
 @pytest.mark.parametrize("kind", ["csv", "npz", "npy"])
-def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
-    gaps = np.random.default_rng(0).uniform(0, 1, (30, data.assembly.m))
+def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, tmp_path: Path) -> None:
+    gaps = np.random.default_rng(0).uniform(0, 1, (30, M))
     path = tmp_path / f"gaps.{kind}"
     match kind:
         case "csv":
@@ -136,7 +123,7 @@ def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, data: Prep
     cases = measured_gaps(scene, path)
     assert cases.count == 30
     # pandas before 3.1 reads the last digits of a text inexactly
-    np.testing.assert_allclose(gaps_of(cases, data), gaps, rtol=0, atol=1e-15 if kind == "csv" else 0)
+    np.testing.assert_allclose(gaps_of(cases), gaps, rtol=0, atol=1e-15 if kind == "csv" else 0)
     np.testing.assert_array_equal(cases.load(0).f, load_case(scene).f)
     assert measured_gaps(scene, path, 4).count == 4
     with pytest.raises(InputError, match="has 30 rows"):
@@ -162,32 +149,20 @@ def test_a_row_of_a_table_stands_for_the_gaps_that_are_measured(tmp_path: Path) 
     assert abs(cases.load(0).g - gaps[0]).max() > 0.1
 
 
-def test_the_first_gap_of_a_table_that_is_no_number_is_named(
-    scene: Scene, data: Prepared, tmp_path: Path
-) -> None:
-    m = data.assembly.m
-    gaps = np.full((500, m), 0.1)
-    path = tmp_path / "gaps.npy"
+def test_the_first_gap_among_the_cases_that_is_no_number_is_named(scene: Scene, tmp_path: Path) -> None:
+    path, gaps = tmp_path / "gaps.npy", np.full((500, M), 0.1)
     gaps[412, 7] = gaps[412, 9] = np.nan
     gaps[499, 0] = np.inf
     np.save(path, gaps)
     said = "gaps.npy: case 412, contact 7 = nan: every gap must be a finite number, in mm; 1 more"
     assert said in str(refusal_of(measured_gaps, scene, path))
-
-
-def test_rows_beyond_the_cases_are_not_read(scene: Scene, data: Prepared, tmp_path: Path) -> None:
-    gaps = np.full((30, data.assembly.m), 0.1)
-    gaps[20, 3] = np.nan
-    np.save(tmp_path / "gaps.npy", gaps)
-    assert measured_gaps(scene, tmp_path / "gaps.npy", 20).count == 20
-    with pytest.raises(InputError, match="case 20, contact 3 = nan"):
-        measured_gaps(scene, tmp_path / "gaps.npy", 21)
+    assert measured_gaps(scene, path, 412).count == 412
 
 
 def test_a_mapped_table_is_never_in_memory_as_a_whole(
-    scene: Scene, data: Prepared, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, gaps = tmp_path / "gaps.npy", np.full((10_000, data.assembly.m), 0.1)
+    path, gaps = tmp_path / "gaps.npy", np.full((10_000, M), 0.1)
     np.save(path, gaps)
     monkeypatch.setattr("problems.load_cases.measured_gaps.AT_ONCE", 2**13)
     monkeypatch.setattr("problems.load_cases.measured_gaps.outliers", lambda gaps, near: gaps > 1)
@@ -213,14 +188,14 @@ def test_a_mapped_table_is_never_in_memory_as_a_whole(
         (",".join(["1.5"] + ["x"] * 44) + "\n", "line 1 .* a finite number"),
     ],
 )
-def test_a_csv_that_is_no_table(text: str, words: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
+def test_a_csv_that_is_no_table(text: str, words: str, scene: Scene, tmp_path: Path) -> None:
     (tmp_path / "gaps.csv").write_text(text)
     with pytest.raises(InputError, match=words):
         measured_gaps(scene, tmp_path / "gaps.csv")
 
 
 @pytest.mark.parametrize("name", ["gaps.csv", "gaps.npz", "gaps.npy", "gaps.txt"])
-def test_a_table_that_cannot_be_read(name: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
+def test_a_table_that_cannot_be_read(name: str, scene: Scene, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=name):
         measured_gaps(scene, tmp_path / name)
     np.savez(tmp_path / "two.npz", a=np.zeros(3), b=np.zeros(3))
@@ -228,7 +203,7 @@ def test_a_table_that_cannot_be_read(name: str, scene: Scene, data: Prepared, tm
         measured_gaps(scene, tmp_path / "two.npz")
 
 
-def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, data: Prepared, tmp_path: Path) -> None:
+def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, tmp_path: Path) -> None:
     cases = sweep(scene, ["initial_gap.random.sd=0.1,0.3", "fasteners.preload = 50:150:3 "])
     assert cases.count == 6
     assert [cases.parameters(k)["fasteners.preload"] for k in range(6)] == [50, 100, 150] * 2
@@ -256,7 +231,7 @@ def test_a_comma_between_digits_in_a_sweep_is_said_to_make_two_values(scene: Sce
         ("fasteners.preload=-1:1:3", "greater than 0"),
     ],
 )
-def test_a_bad_sweep(text: str, words: str, scene: Scene, data: Prepared) -> None:
+def test_a_bad_sweep(text: str, words: str, scene: Scene) -> None:
     with pytest.raises(InputError, match=words):
         sweep(scene, [text])
 
@@ -294,7 +269,7 @@ def test_points_of_a_sweep_are_checked_beside_other_effects() -> None:
     assert keys_of(scene)["fasteners.points.x"].faults(scene, 50.0, "--find")
 
 
-def test_a_key_swept_twice_and_two_effects_of_a_kind(data: Prepared, tmp_path: Path) -> None:
+def test_a_key_swept_twice_and_two_effects_of_a_kind(tmp_path: Path) -> None:
     more = '[[effect]]\nkind = "pressure"\npart = "a"\nvalue = 2e-4\n[[effect]]\nkind = "ribs"'
     scene = read_scene(str(write_strip(tmp_path, ('[[effect]]\nkind = "ribs"', more))))
     with pytest.raises(InputError, match="swept twice"):
