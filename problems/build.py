@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from problems.errors import InputError
@@ -25,7 +24,6 @@ from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, S
 from problems.model.springs import Springs
 from problems.model.stage_answers import stage_scenes
 from problems.reporter import SILENT, Reporter
-from problems.storage import digest, fingerprint
 
 if TYPE_CHECKING:
     from problems.model.joint_model import JointModel
@@ -128,9 +126,8 @@ class GivenModel:
                 allowed = f"at most {DENSEST:.0%} of a block's entries; K is dense: use --form dual or primal"
                 raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
         seconds = time.perf_counter() - start
-        key = digest("sparse", scene.assembly_key, fingerprint([Path(__file__)], ("problems/input",)))
         refuses_singular = isinstance(scene, MatricesScene) or scene.refuses_singular
-        return SparsePrepared(replace(assembly, K=K), key, seconds, scene.source_of, refuses_singular)
+        return SparsePrepared(replace(assembly, K=K), seconds, scene.source_of, refuses_singular)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K with dense blocks. Raises InputError if contacts depend on one another."""

@@ -49,7 +49,7 @@ def digest(*parts: object) -> str:
     """A short hash of text, bytes or anything that JSON can hold."""
     h = hashlib.sha256()
     for part in parts:
-        h.update(part if isinstance(part, bytes) else json.dumps(part, sort_keys=True).encode())
+        h.update(part if isinstance(part, bytes | memoryview) else json.dumps(part, sort_keys=True).encode())
         h.update(b"\0")
     return h.hexdigest()[:20]
 

@@ -36,9 +36,11 @@ def load_plugin(path: Path) -> type[Solver]:
         spec.loader.exec_module(module)
     except SyntaxError as error:
         message = f"is not Python: {error.msg}"
-        raise InputError.one(path, f"line {error.lineno}", (error.text or "").strip(), message) from error
+        where, text = f"line {error.lineno}", (error.text or "").strip()
+        raise InputError.one(error.filename or path, where, text, message) from error
     except (Exception, SystemExit) as error:
-        line = traceback.extract_tb(error.__traceback__)[-1].lineno
+        frames = traceback.extract_tb(error.__traceback__)
+        line = next((frame.lineno for frame in frames if frame.filename == spec.origin), 1)
         message = f"importing the file failed with {type(error).__name__}: {error}"
         raise InputError.one(path, f"line {line}", type(error).__name__, message) from error
     return solver_class(module, path)
@@ -114,8 +116,8 @@ def solver_class(module: ModuleType, path: Path) -> type[Solver]:
     """
     defined = [
         cls
-        for cls in vars(module).values()
-        if inspect.isclass(cls) and issubclass(cls, Solver) and cls.__module__ == module.__name__
+        for cls in dict.fromkeys(filter(inspect.isclass, vars(module).values()))  # which may have two names
+        if issubclass(cls, Solver) and cls.__module__ == module.__name__
     ]
     complete = [cls for cls in defined if not inspect.isabstract(cls)]
     if len(complete) == 1:

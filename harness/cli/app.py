@@ -54,9 +54,9 @@ def harness(version: Annotated[bool, Version] = False) -> None:
       python -m harness init joint.toml           a commented scene to start from
       python -m harness solve scene.toml --out d  one scene: gaps, displacements, forces, with pictures
       python -m harness series SCENE --out DIR    thousands of load cases on one assembly
-      python -m harness place SCENE --out DIR     the fewest fasteners that keep a gap
-      python -m harness shim SCENE --out DIR      the fewest shims that keep a gap
-      python -m harness tolerance SCENE --out DIR how far a key may go
+      python -m harness place --help              the fewest fasteners that keep a gap limit
+      python -m harness shim --help               the fewest shims that keep a gap limit
+      python -m harness tolerance --help          how far a key may go
       python -m harness explore SCENE             a page on which fasteners move
       python -m harness compare OLD NEW           what became worse between two runs
       python -m harness COMMAND --help            help on each command

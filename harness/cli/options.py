@@ -47,7 +47,9 @@ MemoryLimit = Annotated[int, option("MIB", "Memory limit, over all processes of 
 ReferenceLimit = Annotated[
     float | None,
     option(
-        "SECONDS", "For each reference's search.  [default: 60 per thousand contacts, at least 60]", min=0.001
+        "SECONDS",
+        "Limit on the search for each reference.  [default: 60 per thousand contacts, at least 60]",
+        min=0.001,
     ),
 ]
 AllowStress = Annotated[

@@ -30,7 +30,7 @@ def place(
     source: Callable[[], Any],
     scheduler: options.Scheduler = None,
 ) -> None:
-    """Find the fewest fasteners that keep a gap in most load cases, or the best N, and their order.
+    """Find the fewest fasteners that keep a gap limit in most load cases, or the best N, and their order.
 
     Fasteners of the scene's preload are chosen from candidate holes. The load cases are random or measured
     gaps, as of `series`; a scene without random gaps is one case. The share of cases in which a plan keeps

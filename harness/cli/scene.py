@@ -16,7 +16,7 @@ STARTER = Path(__file__).with_name("starter.toml")
 STARTER_OF_PARTS = STARTER.with_name("starter-superelements.toml")
 DOFS = """dofs = [3]                              # the rows of K at each node: 1, 2, 3 displacements,
                                         # 4, 5, 6 rotations; DMIG and Abaqus' text say them themselves
-# rows = "table"                        # how rows go through nodes: if dofs are several, ids not ascending
+# rows = "table"                        # the order of the rows, where dofs are several or ids do not ascend
 
 """
 

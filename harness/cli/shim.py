@@ -36,7 +36,7 @@ def shim(
     source: Callable[[], Any],
     scheduler: options.Scheduler = None,
 ) -> None:
-    """Find the fewest shims from a stock, then the least, that keep a gap after fastening.
+    """Find the fewest shims from a stock, then the least volume, that keep a gap limit after fastening.
 
     The load cases are random or measured gaps, as of `series`; a scene without random gaps is one case. For
     many, one set of shims is found, and fresh cases say in what share of all it keeps the limits; each gap is

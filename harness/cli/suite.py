@@ -45,7 +45,11 @@ def run(
     repeat: Annotated[int | None, option("N", "Number of repeats.", min=1)] = None,
     threads: Annotated[
         list[int] | None,
-        option("N", "Threads for linear algebra. Repeatable.  [with local:N: cores / N]", min=1),
+        option(
+            "N",
+            "Threads for linear algebra. Repeatable.  [with local:N, if the suite has none: cores / N]",
+            min=1,
+        ),
     ] = None,
     time_limit: Annotated[
         float | None,
@@ -55,7 +59,9 @@ def run(
         int | None, option("MIB", "Memory limit, over all processes of the solver.", min=1)
     ] = None,
     reference_limit: ReferenceLimit = None,
-    out: Annotated[Path | None, option("DIR", "Output directory.  [default: results/SUITE]")] = None,
+    out: Annotated[
+        Path | None, option("DIR", "Output directory.  [default: results/SUITE, or the DIR given as SUITE]")
+    ] = None,
     plugin: Plugin = None,
     scheduler: Scheduler = None,
     key: Annotated[str | None, option("KEY", "Only the row with this key, measured again.")] = None,
@@ -63,8 +69,8 @@ def run(
     """Measure a suite and write rows, answers and report.
 
     Each measurement is a process of its own, stopped at its time or memory limit. Rows are saved as they are
-    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped. Until then, the
-    directory takes no run that leaves out some of its measurements.
+    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped. Until it is
+    complete, the directory takes no run that leaves out some of its measurements.
 
     --with measures versions of a library side by side. pip installs each once, into an environment in the
     cache that has all other packages from here. A version that cannot be installed, or that its adapter

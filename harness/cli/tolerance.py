@@ -20,7 +20,7 @@ def tolerance(
     seed: options.Seed = None,
     scheduler: options.Scheduler = None,
 ) -> None:
-    """Find the largest or least value of a key that keeps a gap in a share of the joints.
+    """Find the largest or least value of a key that keeps a gap limit in a share of the joints.
 
     The end of the range that keeps the share decides which. Each value that is tried is a series of the same
     load cases, with proven gaps; fresh cases then show the share at the value that is found. A key may change

@@ -26,7 +26,8 @@ import numpy as np
 
 from harness.measurement.scheduler import shared, threads_per_worker
 from harness.results import records, series_file
-from harness.results.atomic_output import refuse_inputs
+from harness.results.atomic_output import refuse_changed, refuse_inputs
+from harness.results.provenance import fingerprints
 from harness.results.records import TOLERANCE
 from harness.scene.allowed_gap import CONFIDENCE, SHARE, refuse_unusable, share_in_words, share_interval
 from harness.scene.solution import Source, load_scene
@@ -150,6 +151,8 @@ def tolerance(
     key, grid = keys[name], np.linspace(low, high, ceil(1 / resolution - 1e-9) + 1)
     values = [*dict.fromkeys(float(f"{value:.10g}") for value in grid)]
     assert isinstance(read, JointScene)  # which alone has keys
+    files = [Path(file) for file in cases.files]
+    as_given = fingerprints(files)
     for tried in (*values[:2], values[-1]):
         if wrong := key.faults(read, tried, f"--find {name}"):
             raise InputError(wrong)
@@ -162,6 +165,7 @@ def tolerance(
         assert isinstance(read, JointScene)
         if wrong := key.faults(read, value, f"--find {name}"):
             raise InputError(wrong)
+        refuse_changed(files, as_given)  # the same cases at each value
         effects, folder = list(read.effects), directory / (f"{value:.10g}" + "-fresh" * (seed is not None))
         effects[key.effect] = key.changed(effects[key.effect], value, read.joint)
         drawn = cases if seed is None else replace(cases, seed=seed)
@@ -190,7 +194,8 @@ def tolerance(
         shares.append(figures | {"low": low, "high": high, "fresh": seed is not None, "no_answer": missing})
         which = "cases" if seed is None else "fresh cases"
         without = f", {missing} without an answer" if missing else ""
-        reporter.say(f"{name} = {value:g}: within {allow_gap_mm:g} mm in {count} of {total} {which}{without}")
+        within = f"within {allow_gap_mm:g} mm in {count} of {total} {which}{without}"
+        reporter.say(f"{name} = {value:.10g}: {within}")
         return count, most
 
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
@@ -210,7 +215,7 @@ def tolerance(
             fresh, possible = kept(value, (cases.seed or 0) + 1)
             unknown = possible - fresh
             words = share_in_words(fresh, count, unknown)
-            said.append(f"At {value:g} it is kept in {fresh} of {count} fresh cases, proven: {words}.")
+            said.append(f"At {value:.10g} it is kept in {fresh} of {count} fresh cases, proven: {words}.")
             keeps, may = (share_interval(fresh, count, some)[1] >= share for some in (0, unknown))
             outcome = replace(outcome, value=value, passed=keeps or (None if may else False))
             if may and not keeps:
@@ -241,7 +246,7 @@ def searched(
     if rising == (ends[1] < least):
         unjudged = rising and max(most) >= least
         which = f"Neither end {'surely ' * unjudged}keeps" if rising else "Both ends keep"
-        counts = f"{ends[0]} of {count} cases at {values[0]:g}, {ends[1]} at {values[-1]:g}"
+        counts = f"{ends[0]} of {count} cases at {values[0]:.10g}, {ends[1]} at {values[-1]:.10g}"
         said = f"{which} {{limit}}, by {{key}}: {counts}."
         if unjudged:
             unknown = f"of {most[0] - ends[0]} and {most[1] - ends[1]} cases it is not known"
@@ -265,10 +270,10 @@ def searched(
     value = values[edge(least)[0]]
     low, high = sorted((edge(sure)[0], edge(possible, 1)[1]))
     interval = values[low] if low >= 0 else -inf, values[high] if high <= last else inf
-    words = f"{interval[0]:g}" if low >= 0 else f"below {values[0]:g}"
-    words += f" to {interval[1]:g}" if high <= last else f" to above {values[-1]:g}"
+    words = f"{interval[0]:.10g}" if low >= 0 else f"below {values[0]:.10g}"
+    words += f" to {interval[1]:.10g}" if high <= last else f" to above {values[-1]:.10g}"
     said = (
-        f"The {'least' if rising else 'largest'} {{key}} that keeps {{limit}} is {value:g} "
+        f"The {'least' if rising else 'largest'} {{key}} that keeps {{limit}} is {value:.10g} "
         f"({100 * CONFIDENCE:g} % interval {words}), by {count} cases, the same at each value."
     )
     return Tolerance(value, interval, True, (said,))

@@ -42,16 +42,20 @@ def merge(names: Sequence[str], out: Path) -> Path:
     if (out / records.MEASUREMENTS).exists():
         raise InputError.one("--out", "directory", str(out), f"has rows: {records.OTHER}")
     with records.locked(out, folders=("scenes",), outputs=("report", SUITE)):
+        problems: list[records.Row] = []
         for folder, side in zip(map(Path, names), sides, strict=True):
             machine = side.rows[0].get("machine")
             for file in sorted(folder.glob("machine*.json")):
                 record_machine(out, records.read_object(file))
-            problems = records.read(folder / PROBLEMS)  # older ones do not name their machine
-            problems = [row | {"machine": row.get("machine") or machine} for row in problems]
-            records.append(out / PROBLEMS, *problems)
-            for file in (*folder.glob("scenes/*.npz"), *folder.glob(SUITE)):
+            read = records.read(folder / PROBLEMS)  # older ones do not name their machine
+            problems += [row | {"machine": row.get("machine") or machine} for row in read]
+            for file in folder.glob("scenes/*.npz"):
                 shutil.copy(file, out / file.relative_to(folder))
+        records.rewrite(out / PROBLEMS, problems)
         if older:
-            records.append(out / records.OUTDATED, *older)
-        records.append(out / records.MEASUREMENTS, *rows)
+            records.rewrite(out / records.OUTDATED, older)
+        records.rewrite(out / records.MEASUREMENTS, rows)
+        for file in (folder / SUITE for folder in map(Path, names)):  # last: it is refused without rows
+            if file.is_file():
+                shutil.copy(file, out / SUITE)
     return report(out)

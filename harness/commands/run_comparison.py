@@ -15,8 +15,8 @@ from report.results.rows import frame
 from report.writers.comparison_report import Comparison, write
 
 MAX_SLOWDOWN = 1.3
-PAGE = "comparison.md"  # a folder with it has a comparison
-OUTPUTS = ("better.csv", "comparison.csv", "index.html", "solvers.csv", "worse.csv")
+PAGE = "comparison.csv"  # a folder with it has a comparison of runs
+OUTPUTS = ("better.csv", "comparison.md", "index.html", "solvers.csv", "worse.csv")
 
 
 def compare(

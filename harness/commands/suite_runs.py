@@ -7,7 +7,7 @@ from harness.measurement.recorded_suite import SUITE
 from harness.measurement.scheduler import threads_per_worker
 from harness.measurement.suite_run import run as run_suite
 from harness.planning.overrides import Overrides, overridden
-from harness.planning.suite import read_suite, read_written
+from harness.planning.suite import read_suite, read_written, suite_names
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs, refuse_unwritable
 from harness.results.records import MEASUREMENTS, Row
@@ -60,7 +60,8 @@ def run(
     suite : str or Path, optional
         Name of a suite, path of its TOML file, or a directory that `run` wrote.
     out : str or Path, optional
-        Output directory, by default results/SUITE; the same call continues what was interrupted.
+        Output directory, by default results/SUITE, or the directory that is given as `suite`; the same call
+        continues what was interrupted.
     change : Overrides, optional
         What to change in the suite.
     scheduler : str, optional
@@ -90,12 +91,13 @@ def run(
     {'within'}
     """
     written = Path(suite) / SUITE
-    read = read_written(written) if written.is_file() else read_suite(str(suite))
+    again = written.is_file() and str(suite) not in suite_names()
+    read = read_written(written) if again else read_suite(str(suite))
     chosen = overridden(read, change)
     if not change.threads and "threads" not in read.model_fields_set:
         threads = [threads_per_worker(scheduler) or chosen.threads[0]]
         chosen = chosen.model_copy(update={"threads": threads})
-    directory = Path(out) if out else Path("results") / chosen.name
+    directory = Path(out or (suite if again else Path("results") / chosen.name))
     if not (directory / MEASUREMENTS).exists():
         refuse_inputs([directory / SUITE], [Path(suite)])
     code = run_suite(chosen, directory, console_of(reporter), scheduler, key)

@@ -238,7 +238,7 @@ class Explorer:
     def _through(self, settings: Settings, near: LiveAnswer | None, proven: bool) -> LiveAnswer:
         scene = replace(self.scene, effects=settings.applied(self.scene))
         sessions, starts = iter(self.sessions), list[DualStart]()
-        earlier = iter(near.starts) if near else repeat(None)
+        earlier = iter(near.starts) if near and near.starts else repeat(None)
         locks_mm = 0.0  # the largest bound on an answer in which fasteners lock
 
         def solved(part: JointScene, approaches: Matrix) -> tuple[Elongations, LiveAnswer]:

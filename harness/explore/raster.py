@@ -1,4 +1,4 @@
-"""Draws any layout of contacts as an image: each pixel shows the nearest contact."""
+"""Draws any layout of contacts as an image: each pixel shows the largest gap at the nearest place."""
 
 from dataclasses import dataclass
 
@@ -13,17 +13,21 @@ FINEST = 2.0  # pixels per mean distance of contacts, along each axis
 
 @dataclass(frozen=True)
 class Raster:
-    """An image of contacts. low, high : (2,) its corners, mm. nearest : (rows, columns) the contact of each
-    pixel, or m where none is near.
+    """An image of contacts.
+
+    low, high : (2,) its corners, mm. place : (m,) the number of each contact's place, which those of several
+    pairs may share. nearest : (rows, columns) the place of each pixel, or the number of places where none is.
     """
 
     low: Vector
     high: Vector
+    place: Indices
     nearest: Indices
 
     @classmethod
     def of(cls, places: Matrix) -> "Raster":
         """An image with a pixel per contact where the contacts form a full grid. places : (m, 2) mm."""
+        places, place = np.unique(places.round(6), axis=0, return_inverse=True)
         extent = np.ptp(places, axis=0)
         mean = float(np.sqrt(extent.prod() / len(places))) or float(extent.max()) / len(places) or 1.0
         lines = np.array([len(np.unique(axis.round(6))) for axis in places.T])
@@ -36,7 +40,10 @@ class Raster:
         centres = np.stack(np.meshgrid(x, y), axis=-1)
         reach = max(mean, *pixel)
         low, high = centres[0, 0] - pixel / 2, centres[-1, -1] + pixel / 2
-        return cls(low, high, cKDTree(places).query(centres, distance_upper_bound=reach)[1])
+        nearest = cKDTree(places).query(centres, distance_upper_bound=reach)[1]
+        return cls(low, high, place.ravel(), nearest)
 
     def image(self, gap: Vector) -> NDArray[np.float32]:
-        return np.append(gap, np.nan).astype(np.float32)[self.nearest]
+        largest = np.full(self.place.max() + 2, np.nan)
+        np.fmax.at(largest, self.place, gap)
+        return largest.astype(np.float32)[self.nearest]

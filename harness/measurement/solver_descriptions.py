@@ -175,10 +175,8 @@ def rows_in(directory: Path, console: Console) -> list[Row]:
     return rows
 
 
-def resumed(
-    directory: Path, rows: list[Row], plan: list[Measurement], solvers: Solvers, console: Console
-) -> list[Row]:
-    """The valid ones of the rows of DIRECTORY; outdated ones are moved to a file of their own.
+def valid_and_old(rows: list[Row], plan: list[Measurement], solvers: Solvers) -> tuple[list[Row], list[Row]]:
+    """The rows that stand, and the outdated ones.
 
     On a scene of the plan that has changed, these are the rows of all solvers and rounds, planned or not.
     """
@@ -196,13 +194,17 @@ def resumed(
     old: list[Row] = []
     for row in rows:
         (old if is_old(row) else valid).append(row)
+    return valid, old
+
+
+def set_aside(directory: Path, valid: list[Row], old: list[Row], console: Console) -> None:
+    """Move outdated rows of DIRECTORY to a file of their own."""
     if old:
         records.append(directory / records.OUTDATED, *(row | {"answer": None, "log": None} for row in old))
         records.rewrite(directory / records.MEASUREMENTS, valid)
         aside = f"Set aside in {records.OUTDATED}: {counted(len(old), 'row')}"
         why = "because the scene, the solver or the limits have changed since"
         console.print(f"{aside}, {why}.", style="yellow")
-    return valid
 
 
 def outdated(row: Row, m: Measurement, solver: Description) -> bool:
@@ -213,7 +215,7 @@ def outdated(row: Row, m: Measurement, solver: Description) -> bool:
     """
     current = {
         "solver_version": solver.version,
-        "solver_code": solver.code,
+        "solver_code": row.get("solver_code") if solver.failure else solver.code,  # a failure says nothing
         "limit_asked_mm": m.suite.limit_mm,
         "gated": m.entry.gated,
     }

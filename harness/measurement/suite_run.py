@@ -38,7 +38,7 @@ from report.document.numbers import counted, upwards
 
 from .recorded_suite import other_suite, record_suite
 from .scheduler import done_as_completed, workers
-from .solver_descriptions import Solvers, describe, resumed, rows_in
+from .solver_descriptions import Solvers, describe, rows_in, set_aside, valid_and_old
 from .task import Task, TaskResult, rows_of, run_task, run_task_on_worker
 
 
@@ -65,8 +65,10 @@ def run(
     folders, outputs = ("answers", "scenes", "logs"), ("report", *other_suite(directory, suite))
     with records.locked(directory, folders=folders, outputs=outputs):
         rows = rows_in(directory, console)
-        record_suite(directory, suite, plan, rows, key)
-        rows = resumed(directory, rows, plan, solvers, console)
+        valid, old = valid_and_old(rows, plan, solvers)
+        record_suite(directory, suite, plan, rows if key else valid, key)
+        set_aside(directory, valid, old, console)
+        rows = valid
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)

@@ -25,7 +25,7 @@ from harness.placement.candidates import Plan
 from harness.placement.plan_search import PlanSearch, Step
 from harness.scene.allowed_gap import CONFIDENCE, SHARE, share_interval
 from problems.errors import InputError
-from report.document.numbers import beside, counted, raised
+from report.document.numbers import beside, counted, percent_interval, raised
 
 ALPHA = 0.05
 POWER = 0.8
@@ -147,10 +147,10 @@ class Sample:
         plan = f"{which}{counted(len(step.plan), self.item)} {'keeps' if len(step.plan) == 1 else 'keep'}"
         plan = plan if step.plan else f"joints without a {self.item} keep"
         digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
-        share, low, high = (f"{100 * value:.{digits}f}" for value in (self.kept / cases, *self.interval))
         limit = beside(inf, raised)(step.gap_mm) if goal.limit_mm is None else f"{goal.limit_mm:g}"
-        of = f"all {cases}" if self.kept == cases > 1 else f"{share} % of {cases}"
-        interval = f"{100 * CONFIDENCE:g} % interval {low} to {high} %"
+        share = f"{100 * self.kept / cases:.{digits}f} %"
+        of = f"all {cases}" if self.kept == cases > 1 else f"{share} of {cases}"
+        interval = f"{100 * CONFIDENCE:g} % interval {percent_interval(self.interval, digits)}"
         return f"{plan} {limit} mm{goal.also} in {of} {self.cases} ({interval})"
 
 

@@ -21,7 +21,7 @@ from harness.placement.search import Search
 from harness.placement.search_record import identity_of, record_of, sentence_on
 from harness.placement.session import THREADS, FastenerStudy
 from harness.results import records
-from harness.results.atomic_output import refuse_inputs
+from harness.results.atomic_output import refuse_changed, refuse_inputs
 from harness.results.provenance import fingerprints
 from harness.scene.allowed_gap import refuse_unusable
 from harness.scene.scene_file import MOVED, edited, file_of, opened, with_fasteners
@@ -160,6 +160,8 @@ def place(
     preload: Any = movable.fastener.preload
     text = opened(source)  # these files may change while plans are searched
     files = fingerprints(file for file in inputs if file.is_file())
+    data = [file for file in inputs if file.is_file() and file != Path(source)]
+    of_data = fingerprints(data)
 
     def text_of(plan: Plan) -> str:
         return edited(text, directory, with_fasteners(plan, preload), MOVED, law)
@@ -183,6 +185,7 @@ def place(
         from report.document.escape import csv_frame  # slow to import: not before the search
         from report.writers.place_report import write
 
+        refuse_changed(data, of_data)  # which the series of the plans read again
         plans = {"own": movable.current} | ({"plan": result.best.plan} if result.best else {})
         for name, plan in plans.items():
             records.replace_text(directory / f"{name}.toml", text_of(plan))

@@ -36,9 +36,10 @@ from problems.effects.fasteners import Fasteners
 from problems.forms import Form
 from problems.forms.assembly import DualLoadCase, Matrix, Vector
 from problems.load_cases import LoadCases
-from problems.model.effect import Effect
+from problems.model.effect import Effect, code_of
 from problems.model.scene import JointScene
 from problems.model.stage_answers import Elongations, locked, through
+from problems.storage import fingerprint
 from solvers.algorithms.newton_sweeps import Case
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
@@ -63,6 +64,7 @@ class Study(ABC):
         """The facts that decide the outcome of a plan."""
         return {
             "scene_key": self.scene.key,
+            "effects_code": fingerprint(code_of(self.scene.effects)),
             "cases_key": self.cases.content_key,
             "cases": self.cases.count,
             "form": self.form,

@@ -231,8 +231,9 @@ def of_key(plan: Sequence[Measurement], key: str) -> list[Measurement]:
         return [replace(chosen, entry=entry)]
     batched = chosen.entry.batched
     end = (chosen.case // (batched or 1) + 1) * (batched or 1)
-    same = (m for m in plan if m.process == chosen.process)
-    return [replace(m, entry=entry) for m in same if m.case is not None and m.case < end]
+    same = [m for m in plan if m.process == chosen.process and m.case is not None and m.case < end]
+    entry = entry.model_copy(update={"cases": len(same)})
+    return [replace(m, entry=entry) for m in same]
 
 
 def _unknown(suite: str, key: str) -> InputError:

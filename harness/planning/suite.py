@@ -314,11 +314,14 @@ def _planned_twice(suite: Suite, one: SolverEntry, other: SolverEntry) -> Iterat
 
 
 def _of_rounds(suite: Suite, path: Path) -> Iterator[Fault]:
-    """Entries with `beside` that a round cannot measure."""
+    """Entries with `beside` that a round cannot measure, or with a search that a trace would stop."""
     allowed = "needs numbers as tolerances, and a suite without [series]"
     for k, entry in enumerate(suite.solver):
-        if entry.beside and (suite.series or (entry.tolerances or suite.tolerances) == "auto"):
+        searched = (entry.tolerances or suite.tolerances) == "auto"
+        if entry.beside and (suite.series or searched):
             yield Fault(str(path), f"solver.{k}.beside", True, allowed)
+        if suite.trace and searched:
+            yield Fault(str(path), f"solver.{k}.tolerances", "auto", "numbers: a trace searches for none")
 
 
 def _of_series(suite: Suite, path: Path) -> Iterator[Fault]:

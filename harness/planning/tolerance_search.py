@@ -18,7 +18,7 @@ from harness.results.schema import STEPS
 from .plan import HALF_DECADES, MOST_REPEATS, Measurement
 
 #: (seconds of the first run below which, repeats).
-REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
+REPEATS = ((2.0, MOST_REPEATS), (20.0, 3))
 EXCEEDED = ("time_limit", "memory_limit")
 START = 1e-6  # of a search, where the solver has no rows in the form
 DECADE = 2  # places in HALF_DECADES
@@ -157,9 +157,9 @@ def _of_cell(m: Measurement, rows: Sequence[Row]) -> list[Row]:
 
 
 def _repeats(row: Row) -> int:
-    return next(repeats for limit, repeats in REPEATS if _seconds(row) < limit)
+    return next((repeats for limit, repeats in REPEATS if _seconds(row) < limit), 1)
 
 
 def _seconds(row: Row) -> float:
-    """The seconds of all steps."""
-    return sum(row.get(name) or 0.0 for name in STEPS)
+    """The seconds of all steps; infinite where the solver did not end."""
+    return inf if row.get("solve_s") is None else sum(row.get(name) or 0.0 for name in STEPS)

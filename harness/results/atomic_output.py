@@ -2,11 +2,12 @@
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from harness.results.provenance import fingerprints
 from harness.results.records import parsed, replace_text, to_line
 from problems.errors import InputError
 from problems.input.bounded_types import resolved
@@ -112,6 +113,13 @@ def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path], option: str =
             raise InputError.one(option, "path", str(path), "no regular file: name another")
         if any(_is_same(path, other) for other in inputs):
             raise InputError.one(option, "path", str(path), "is one of the files that are read: name another")
+
+
+def refuse_changed(files: Iterable[Path], before: Mapping[str, str]) -> None:
+    """Raise InputError if one of the files is another than it was. before : their `fingerprints`."""
+    for name, digits in fingerprints(files).items():
+        if digits != before[name]:
+            raise InputError.one(name, "content", "changed meanwhile", "that of the beginning: run again")
 
 
 def _is_same(one: Path, other: Path) -> bool:

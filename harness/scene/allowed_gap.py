@@ -21,7 +21,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
-from report.document.numbers import beside, counted, position, proven_to
+from report.document.numbers import beside, counted, percent_interval, position, proven_to
 
 from .mesh_error import MeshError
 from .solution import Solution
@@ -67,9 +67,9 @@ def share_interval(
 
 
 def share_in_words(kept: int, count: int, unknown: int) -> str:
-    """the share of joints is between 64.55% and 88.44%, with 95% confidence"""
-    low, high = share_interval(kept, count, unknown)
-    return f"the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
+    """the share of joints is 64.55 to 88.44 %, with 95 % confidence"""
+    interval = percent_interval(share_interval(kept, count, unknown), 2)
+    return f"the share of joints is {interval}, with {100 * CONFIDENCE:g} % confidence"
 
 
 def check_answer(

@@ -24,7 +24,7 @@ from problems.input.matrix_files import reading
 from problems.input.tables import Cells, doubt, is_stray, number
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
-from report.document.numbers import error_beside, position, proven_to, upwards
+from report.document.numbers import error_beside, limit_beside, position, proven_to, upwards
 
 LARGEST_MIB = 1024
 #: The vectors of an answer, by their names in a file.
@@ -68,7 +68,8 @@ def judge_file(
     limit = problem.limit_mm(limit_mm)
     judgement, bound = problem.judged(x, lam, limit), problem.reference.bound_mm
     console.print(_table(problem, judgement, x, limit))
-    text = f"{judgement.verdict.capitalize()} {limit:.3g} mm."
+    shown = limit_beside(judgement.displacement_error_mm, limit)
+    text = f"{judgement.verdict.capitalize()} {shown} mm."
     if judgement.verdict == "cannot_be_judged":
         how = problem.reference.route
         text = f"Cannot be judged: the reference is {proven_to(bound)} ({how})."

@@ -110,6 +110,14 @@ def remeshed(joint: Joint, factor: float) -> Joint:
     return joint.model_copy(update={"junction": junction, "part": tuple(parts)})
 
 
+def _at_its_points(effect: Any, joint: Joint) -> Any:
+    """The effect with the points of its pattern, which may be moved to the nodes of a mesh."""
+    if getattr(effect, "pattern", None) is None:
+        return effect
+    points = tuple(map(tuple, effect.marks(joint).tolist()))
+    return effect.model_copy(update={"points": points, "pattern": None})
+
+
 def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector]:
     """max |y_h − y| over the contacts of the coarser of the two meshes, y the gaps on another mesh, and over
     the largest gaps of the pairs, mm; and the scene there, without stages, with its û.
@@ -117,7 +125,9 @@ def on_mesh(solution: Solution, joint: Joint) -> tuple[float, JointScene, Vector
     Raises InputError if the other mesh has no answer.
     """
     scene: Any = solution.scene
-    here, other = scene.joint, replace(scene, joint=joint)
+    here = scene.joint
+    effects = [_at_its_points(effect, here) for effect in scene.effects]
+    other = replace(scene, joint=joint, effects=tuple(effects))
 
     def answer(part: JointScene, approaches: Matrix) -> tuple[Elongations, tuple[Vector, JointScene, Vector]]:
         """Elongations of a stage on the other mesh; its gaps, its scene, and û."""

@@ -124,6 +124,9 @@ def with_gaps(cases: RandomGaps) -> Callable[[Any], None]:
     def change(document: Any) -> None:
         for old in of_kind(document, "initial_gap"):
             document["effect"].remove(old)
+        laws = document.get("random", {})
+        for key in [key for key in laws if kind != "initial_gap" and key.split(".")[0] == "initial_gap"]:
+            del laws[key]  # of a gap that is no longer there
         add_effect(document, {"kind": kind} | table)
 
     return change

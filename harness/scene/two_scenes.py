@@ -25,8 +25,8 @@ from problems.model.surface import surface_of
 from problems.scene_files import read_scene
 
 FOLDERS = ["first", "second"]
-PAGE = "comparison.md"  # a folder with it has a comparison
-OUTPUTS = ("contacts.csv", "difference.png", "fasteners.csv", "gaps.png", "index.html", "pairs.csv")
+PAGE = "pairs.csv"  # a folder with it has a comparison of scenes
+OUTPUTS = ("comparison.md", "contacts.csv", "difference.png", "fasteners.csv", "gaps.png", "index.html")
 SHIFT = 0.05  # of the junction's longer side, by which the corners of two meshes of it may differ
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from harness.verification.judge import LIMIT_MM, REFERENCE_SHARE
 from harness.verification.reference import best_of_candidates
 from problems.build import prepared
 from problems.load_cases.random_inputs import RandomInputs
@@ -21,14 +22,15 @@ from .session import Job
 
 STEP = 1e-3  # of the interquartile range
 ROUNDING = 1e-12  # of the largest: a smaller rate is 0
+ALIKE = 1e-9  # of the largest: rates that differ by less are the same
 
 
 def derivatives(job: Job) -> dict[str, list[Any]]:
     """The derivative of the largest gap by each input, at the means.
 
-    Columns: name, mean, derivative in mm per unit and per standard deviation (NaN if the input changes K),
-    and the values between which it holds. The elements of an input with `each` move together; the field of
-    the gap is at its mean.
+    Columns: name, mean, derivative in mm per unit and per standard deviation (NaN if the input changes K, or
+    if the answer at the means is not proven), and the values between which it holds. The elements of an input
+    with `each` move together; the field of the gap is at its mean.
     """
     assert isinstance(job.cases, RandomInputs)
     laws = [one.law for one in job.cases.inputs]
@@ -50,12 +52,15 @@ def derivatives(job: Job) -> dict[str, list[Any]]:
     dy = np.where(abs(dy) > ROUNDING * abs(dy).max(axis=0, initial=0.0), dy, 0.0)
     largest = dy[y.argmax()] if len(y) else np.zeros(len(means))
     margin = np.concatenate([answer.lam[C], y, y.max(initial=0.0) - y])[:, None]
-    rate = np.vstack([dlam, dy, largest - dy])
+    away = largest - dy
+    away = np.where(abs(away) > ALIKE * abs(dy).max(axis=0, initial=0.0), away, 0.0)  # as of mirror images
+    rate = np.vstack([dlam, dy, away])
     with np.errstate(divide="ignore", invalid="ignore"):
         until = -margin / rate
     low = means + np.where(rate > 0, until, -np.inf).max(axis=0, initial=-np.inf)
     high = means + np.where(rate < 0, until, np.inf).min(axis=0, initial=np.inf)
-    largest = np.where([one.changes_K for one in cases.inputs], np.nan, largest)
+    unknown = answer.bound_mm > REFERENCE_SHARE * LIMIT_MM  # nor is the set of closed contacts known
+    largest = np.where([one.changes_K or unknown for one in cases.inputs], np.nan, largest)
     figures = {"mean": means, "derivative": largest, "per_sd_mm": largest * [law.std() for law in laws]}
     rows = {name: values.tolist() for name, values in (figures | {"low": low, "high": high}).items()}
     return {"input": [one.name for one in cases.inputs]} | rows

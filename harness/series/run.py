@@ -25,9 +25,11 @@ from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
 from problems.errors import InputError
+from problems.model.effect import code_of
 from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
+from problems.storage import fingerprint
 from report.document.numbers import counted, upwards
 
 from .executors import results_of
@@ -86,8 +88,10 @@ def solve_remaining(
 
 def identity(job: Job) -> dict[str, Any]:
     """The facts that all rows of one series share."""
+    effects = job.scene.effects if isinstance(job.scene, JointScene) else ()
     return {
         "scene_key": job.scene.key,
+        "effects_code": fingerprint(code_of(effects)),
         "cases_key": job.cases.key,
         "solver": job.solver,
         "options": job.solver_options,

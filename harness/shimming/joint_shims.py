@@ -10,7 +10,7 @@ from harness.placement.session import Outcome, PlanSession, Question
 from harness.scene.allowed_gap import CONFIDENCE, share_interval
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.reporter import Reporter
-from report.document.numbers import counted, out_of
+from report.document.numbers import counted, out_of, percent_interval
 
 from .shim_search import ShimSearch
 from .study import ShimStudy
@@ -51,9 +51,9 @@ def each_joint(
     most = goal.allowed_fresh(count, ALPHA)
     if isinstance(study.cases, MeasuredGaps):  # there are no others
         most = floor((1 - goal.share) * count + 1e-9)
-    low, high = share_interval(kept, count, sum(isinf(one.largest[0]) for one in after))
+    interval = share_interval(kept, count, sum(isinf(one.largest[0]) for one in after))
     words = f"{out_of(kept, count, 'joint')} can be kept within the limits, {100 * kept / count:.1f} %"
-    words += f" ({100 * CONFIDENCE:g} % interval {100 * low:.1f} to {100 * high:.1f} %)"
+    words += f" ({100 * CONFIDENCE:g} % interval {percent_interval(interval)})"
     none = "no shim is needed" if kept == count else "none of these needs a shim"
     words += f", with {counted(pieces, 'shim')} in all" if pieces else f"; {none}" * bool(kept)
     passed = count - kept <= most

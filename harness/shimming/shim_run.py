@@ -158,6 +158,8 @@ def shim(
     if faults or not isinstance(read, JointScene):
         raise InputError(faults)
     bare = last_scene(read)
+    scene_text = ("", directory) if each else opened(file_of(scene, read))
+    files = fingerprints(file for file in inputs if file.is_file())  # which may change during the search
     if allow_stress is not None:
         refuse_unusable(allow_stress, bare)
         if none_told(bare):  # whatever is between the parts
@@ -189,11 +191,11 @@ def shim(
     case_numbers = Cases(range(made.count), made.count) if each else Cases.of(made.count, listed, goal)
     if patches is None:
         gap = PlanSession(study).largest_gap(case_numbers.numbers[: case_numbers.choosing])
-        there = patches_of_gap(bare.joint, gap, allow_gap_mm) or there
+        own = list(read.effects_of(Shims))
+        free = tuple(patch for patch in there if not any(patch.shim.faults(bare.joint, own)))
+        there = patches_of_gap(bare.joint, gap, allow_gap_mm) or free or there
         study = replace(study, patches=there)
     law = other_gaps(bare, made)
-    scene_text = ("", directory) if each else opened(file_of(scene, read))
-    files = fingerprints(file for file in inputs if file.is_file())  # which may change during the search
 
     def text(shims: list[Shims]) -> str:
         def change(document: Any) -> None:

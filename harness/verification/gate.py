@@ -27,7 +27,7 @@ from problems.errors import InputError
 from problems.forms import form_family
 from problems.input.bounded_types import Positive
 from report.document.escape import markdown, quoted, short
-from report.document.numbers import counted, error_beside, out_of, proven_to
+from report.document.numbers import counted, error_beside, limit_beside, out_of, proven_to
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
@@ -52,7 +52,7 @@ UNREADABLE = "is missing, damaged or not finite"
 MOST_LINES, LONGEST_CELL = 200, 200
 
 #: The files of a run that no output may replace.
-MEASURED = ("*.jsonl", "*.toml", "machine*.json", "answers/*")
+MEASURED = ("*.jsonl", "*.toml", "machine*.json", "answers/*", "answers.zip")
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,7 @@ def table(findings: list[Finding]) -> Table:
 def _cells(finding: Finding) -> tuple[str, ...]:
     error, limit = finding.judgement.displacement_error_mm, finding.limit_mm
     shown = "–" if error is None else error_beside(limit, error)
-    return finding.key, shown, f"{limit:.3g}", finding.judgement.verdict, finding.why
+    return finding.key, shown, limit_beside(error, limit), finding.judgement.verdict, finding.why
 
 
 def append_summary(path: Path, outcome: GateOutcome) -> None:

@@ -22,8 +22,8 @@ matter where λ came from. Refinement of x and λ_C in twice the working precisi
     x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
 
 by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M (closed_contacts.py), or
-with springs at the contacts of C where there is neither M nor Q, or σ² = 0 (sprung_contacts.py). Load cases
-are columns; a column is taken out when its bound is small enough.
+with springs at the contacts of C where there is neither M nor Q, or K is small and dense and σ² = 0
+(sprung_contacts.py). Load cases are columns; a column is taken out when its bound is small enough.
 """
 
 from collections.abc import Callable, Iterable, Sequence

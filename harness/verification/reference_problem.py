@@ -20,6 +20,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
+from problems.model.effect import code_of
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import Elongations, last_scene, locked, through
 from problems.reporter import SILENT, Reporter
@@ -144,7 +145,8 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> tuple[Scene, bool]
     """
     if not (isinstance(scene, JointScene) and scene.stages):
         return scene, True
-    code = storage.fingerprint([Path(__file__)], within=["harness/verification", "problems"])
+    files = [Path(__file__), *code_of(scene.effects)]
+    code = storage.fingerprint(files, within=["harness/verification", "problems"])
     key, last = storage.digest("stages", scene.key, code), last_scene(scene)
     if (stored := storage.load(key)) is not None:
         return locked(last, stored[0]["approaches"][:, 0]), True
@@ -163,7 +165,8 @@ def last_stage(scene: Scene, limit_s: float | None = None) -> tuple[Scene, bool]
 
     *_, (_, _, approaches, _) = through(scene, solve)
     if proven := max(bounds) <= REFERENCE_SHARE * LIMIT_MM:
-        storage.load_or_make(key, lambda: ({"approaches": approaches}, {}))  # unless another was faster
+        stored = storage.load_or_make(key, lambda: ({"approaches": approaches}, {}))  # another's, if faster
+        approaches = np.array(stored[0]["approaches"])
     return locked(last, approaches[:, 0]), proven
 
 

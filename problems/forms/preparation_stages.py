@@ -8,6 +8,8 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from problems import storage
 from problems.errors import InputError
 from problems.reporter import Reporter, Stage
@@ -25,12 +27,13 @@ LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 SourceOf = Callable[[str], object]
 
 
-def _contents(assembly: Assembly) -> Iterator[list[int] | bytes]:
-    """What a key needs to tell A from another one: its shape and its arrays."""
-    A = assembly.A
-    yield [*A.shape]
-    for array in (A.data, A.indices, A.indptr):
-        yield array.tobytes()
+def _contents(assembly: Assembly) -> Iterator[list[int] | memoryview]:
+    """What a key needs to tell A, and a sparse K with its junction, from another one."""
+    A, K = assembly.A, assembly.K
+    junction = [] if assembly.junction is None else [assembly.junction]
+    yield [*A.shape, len(junction)]
+    for array in (A.data, A.indices, A.indptr, *junction, *(() if K.dense else K.arrays)):
+        yield np.ascontiguousarray(array).data
 
 
 class SparsePrepared(Prepared):
@@ -38,7 +41,6 @@ class SparsePrepared(Prepared):
 
     Parameters
     ----------
-    key : names K in the cache; with A, it names the bounds and answers that are proven and kept there.
     model_s : seconds in which K was made.
     source_of : gives the origin of "K" or "A", for messages.
     refuses_singular : whether K is refused if it is nearly singular.
@@ -47,7 +49,6 @@ class SparsePrepared(Prepared):
     def __init__(
         self,
         assembly: Assembly,
-        key: str,
         model_s: float,
         source_of: SourceOf,
         refuses_singular: bool = False,
@@ -56,9 +57,13 @@ class SparsePrepared(Prepared):
         K = Stiffness(assembly.K.blocks, self._factor)
         notes = (*assembly.notes, ONE_OF_MANY) if assembly.dependent else assembly.notes
         super().__init__(replace(assembly, K=K, notes=notes), coarser=coarser)
-        self.key = storage.digest(key, *_contents(assembly))
         self.model_s, self.source_of = model_s, source_of
         self.refuses_singular = refuses_singular
+
+    @cached_property
+    def key(self) -> str:
+        """Of every bit of K and A: it names the bounds and answers that are proven and kept in the cache."""
+        return storage.digest("sparse", *_contents(self.assembly))
 
     def _factor(self, K: Stiffness) -> None:
         nodes = self.assembly.nodes

@@ -40,8 +40,6 @@ class Prepared:
         Makes an assembly of similar Q whose factors are cheaper, for M.
     """
 
-    #: The key of the matrices in the cache; None if they are in memory only.
-    key: str | None = None
     #: Seconds in which this process made K; None if it opened K.
     model_s: float | None = None
 
@@ -53,6 +51,11 @@ class Prepared:
     ) -> None:
         self.assembly, self.coarser = assembly, coarser
         self.Q_if_made = Q
+
+    @cached_property
+    def key(self) -> str | None:
+        """The key of the matrices in the cache; None if they are in memory only."""
+        return None
 
     @property
     def form(self) -> Form:

@@ -23,6 +23,7 @@ from problems.forms.assembly import Matrix, Vector
 from problems.input.scan_points import crowded, too_small, unlike
 from problems.input.tables import AS_NAMED, TableOptions, read_columns
 from problems.model.interface import AnyJoint, on_junction
+from problems.model.joint import Pair
 from problems.storage import digest
 
 NOISE = 1e-3  # ν
@@ -30,18 +31,21 @@ MOST = 5000  # points of a scan: WCWᵀ is dense
 _last: dict[str, "Scan"] = {}
 
 
-def read_scan(path: Path, joint: AnyJoint, options: TableOptions = AS_NAMED) -> tuple[Matrix, list[str]]:
+def read_scan(
+    path: Path, joint: AnyJoint, options: TableOptions = AS_NAMED, between: Pair | None = None
+) -> tuple[Matrix, list[str]]:
     """(s, 3) x, y and gap in mm, by x and y; and sentences on what is unusual.
 
-    Raises InputError with all faults, also of points off the junction or at one place.
+    Raises InputError with all faults, also of points off the parts of the pair, or of all, or at one place.
     """
+    parts = tuple(name for name in joint.names if name in (between or joint.names))
     read = read_columns(path, ("x", "y", "gap"), options)
     if len(read.rows) > MOST:
         raise InputError.one(path, "points", len(read.rows), f"at most {MOST}: thin the scan out")
     points, lines = np.array(read.rows).reshape(-1, 3), read.lines
     outside = [
         Fault(str(path), f"line {lines[k]}", points[k, :2].tolist(), on_junction(joint))
-        for k in np.flatnonzero(~joint.covers(joint.names, points[:, :2]))
+        for k in np.flatnonzero(~joint.covers(parts, points[:, :2]))
     ]
     twice = [
         Fault(str(path), f"line {lines[k]}", points[k].tolist(), f"one gap per point, see line {lines[i]}")

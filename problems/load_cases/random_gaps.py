@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
+from problems.effects.measured_gap import MeasuredGap
 from problems.errors import Fault, InputError, refuse_text
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -31,6 +32,15 @@ def case_seed(seed: int, k: int) -> int:
     """The seed of the gap of case k of a series with this seed."""
     state = np.random.SeedSequence((seed, k)).generate_state(1, np.uint64)[0]
     return int(state) >> (64 - SEED_BITS)
+
+
+def only_field(scene: JointScene) -> InitialGap | None:
+    """The scene's `initial_gap`, None without one. Raises InputError if there are several."""
+    fields = [*scene.effects_of(InitialGap)]
+    if len(fields) > 1:
+        where, found = f"scene {scene.name}", f"{len(fields)} effects"
+        raise InputError.one(where, "initial_gap", found, "at most one can be random")
+    return fields[0] if fields else None
 
 
 @dataclass(frozen=True)
@@ -145,14 +155,18 @@ def random_gaps(
     if not isinstance(scene, JointScene):
         allowed = "a random field needs a joint; own matrices take a table of gaps (--gaps)"
         raise InputError.one(where, "assembly", "own matrices", allowed)
-    fields = list(scene.effects_of(InitialGap))
-    if len(fields) > 1:
-        raise InputError.one(where, "initial_gap", f"{len(fields)} effects", "at most one can be random")
-    table: dict[str, Any] = fields[0].model_dump() if fields else {"kind": "initial_gap"}
+    only, measured = only_field(scene), [*scene.effects_of(MeasuredGap)]
+    table: dict[str, Any] = only.model_dump() if only else {"kind": "initial_gap"}
+    if only is None and 1 < len(measured) < len(scene.joint.pairs):
+        found, allowed = f"{len(measured)} effects", "one, or one for each contact, can scatter"
+        raise InputError.one(where, "measured_gap", found, allowed)
+    if only is None and len(measured) == 1:  # which scatters where it is
+        table["between"] = measured[0].between
     law = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    points, notes = (None, []) if around is None else read_scan(Path(around), scene.joint, options)
+    pair = table.get("between")
+    points, notes = (None, []) if around is None else read_scan(Path(around), scene.joint, options, pair)
     usual = None if points is None else float(points[:, 2].mean())
-    if any(effect.kind == "measured_gap" for effect in scene.effects):
+    if measured:
         if around is not None:
             allowed = f"remove it: the gaps pass through {around}"
             raise InputError.one(where, "measured_gap", "an effect of the scene", allowed)
@@ -171,7 +185,7 @@ def random_gaps(
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     for key, value, usable in field.faults(scene.joint) if scene.joint.pairs else ():  # of a length too short
         raise InputError.one("series", f"initial_gap.{key}", value, usable)
-    others = [effect for effect in scene.effects if effect not in fields]
+    others = [effect for effect in scene.effects if effect is not only]
     made = RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)
     if made.scan is None:
         return made

@@ -24,11 +24,12 @@ from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import valid_table
 from problems.input.tables import AS_NAMED, TableOptions, read_columns
 from problems.model.interface import AnyJoint
+from problems.model.joint import Pair
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
 from . import LoadCases
-from .random_gaps import case_seed
+from .random_gaps import case_seed, only_field
 
 VARIANCE = 0.99  # kept, if no share is given
 
@@ -87,7 +88,9 @@ def scan_modes(
     if len(paths) < 2:
         raise InputError.one("--scans", "files", pattern, f"two files or more; {len(paths)} there")
     joint, notes = scene.joint, list[str]()
-    scans = np.array(read_all(lambda path: gaps_of(joint, path, options, notes), paths))
+    field = only_field(scene)
+    between = field.between if field else None
+    scans = np.array(read_all(lambda path: gaps_of(joint, path, options, notes, between), paths))
     mean = scans.mean(axis=0)
     _, s, V = np.linalg.svd((scans - mean) / np.sqrt(len(scans) - 1), full_matrices=False)
     total = np.cumsum(s**2)
@@ -100,10 +103,15 @@ def scan_modes(
     return ScanModes(rest, digest(scans.tobytes()), mean, modes, seed, count, tuple(notes))
 
 
-def gaps_of(joint: AnyJoint, path: Path, options: TableOptions, notes: list[str]) -> Vector:
-    """The gaps (m,) mm of a scan at the contacts; notes are added to the list. Raises InputError."""
+def gaps_of(
+    joint: AnyJoint, path: Path, options: TableOptions, notes: list[str], between: Pair | None = None
+) -> Vector:
+    """The gaps (m,) mm of a scan at the contacts, of one pair or of all; notes are added to the list. Raises
+    InputError.
+    """
     read = read_columns(path, MeasuredGap.columns, options)
-    faults, table = list(read.faults), {"kind": "measured_gap", "points": read.rows}
+    faults = list(read.faults)
+    table = {"kind": "measured_gap", "points": read.rows, "between": between}
     effect = None if faults else valid_table(MeasuredGap, table, path, faults)
     if effect is not None:
         effect._lines = tuple(f"line {line}" for line in read.lines)

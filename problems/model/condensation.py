@@ -8,7 +8,6 @@ unknowns per line and k kept ones these are about 2wk² operations, all in produ
 travels along the part takes wk² operations per line.
 """
 
-import inspect
 import itertools
 import time
 from collections.abc import Callable, Sequence
@@ -26,6 +25,7 @@ from problems.stiffness.dense_block import mirrored
 from problems.storage import fingerprint
 
 from .banded_numbering import lines_across
+from .effect import code_of
 from .part import CODE, PartLoadEffect, PartModel
 
 
@@ -91,9 +91,7 @@ def condense(
 
 def part_key(part: PartModel) -> str:
     """The hash of the code and data of a part's stiffness; its name does not count."""
-    modules = (inspect.getmodule(type(effect)) for effect in part.effects)
-    files = [Path(inspect.getfile(module)) for module in modules if module]
-    code = fingerprint([*files, Path(__file__)], within=CODE)
+    code = fingerprint([*code_of(part.effects), Path(__file__)], within=CODE)
     data = [effect.model_dump(mode="json", exclude={"part", "name"}) for effect in part.effects]
     return storage.digest("part", part.geometry, data, code)
 
@@ -150,7 +148,7 @@ def condensed_load(
 
     if not kept:
         return force()
-    code = fingerprint([Path(inspect.getfile(type(effect))), Path(__file__)], within=CODE)
+    code = fingerprint([*code_of([effect]), Path(__file__)], within=CODE)
     key = storage.digest(
         "load", part_key(part), effect.model_dump(mode="json", exclude={"part", "name"}), code
     )

@@ -5,8 +5,10 @@ module is imported only when a scene names it. A table in docs/effects.md says w
 effect that acts on contacts and adds to the gap derives from two: `class Shims(ContactEffect, GapEffect)`.
 """
 
+import inspect
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -318,6 +320,12 @@ class SpringEffect(ForceEffect):
         k : (r,) ndarray
             N/mm.
         """
+
+
+def code_of(effects: Iterable[Effect]) -> list[Path]:
+    """The files of their classes, which no import names: what is kept in the cache by code needs them."""
+    modules = (inspect.getmodule(type(effect)) for effect in effects)
+    return [Path(inspect.getfile(module)) for module in modules if module]
 
 
 def unknown_part(part: str, joint: AnyJoint) -> Faults:

@@ -151,7 +151,8 @@ class EffectTable:
     def _located(self, faults: Faults) -> Iterator[Fault]:
         """Yield faults of keys with the place of each: the scene, or the line of a file's row."""
         for key, value, allowed in faults:
-            row = re.fullmatch(r"(?:points|preload)(?:\[(\d+)\]|\.(\d+)(?:\.\d+)?)", key)
+            names = "|".join(["points", *(self.rows.columns if self.rows else ())])
+            row = re.fullmatch(rf"(?:{names})(?:\[(\d+)\]|\.(\d+)(?:\.\d+)?)", key)
             if self.rows and row:
                 line = self.rows.lines[int(row[1] or row[2])]
                 yield Fault(str(self.rows.path), f"line {line}", value, allowed)

@@ -10,7 +10,6 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -23,13 +22,12 @@ from problems.reporter import SILENT, Reporter
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse_block import sparse_block
-from problems.storage import fingerprint
 
 from .banded_numbering import Numbering
 from .effect import Effect
 from .joint import Joint
 from .junction_terms import junction_load
-from .part import CODE, PartLoadEffect, PartModel, graded
+from .part import PartLoadEffect, PartModel, graded
 from .scene import JointScene
 from .springs import Springs
 
@@ -59,10 +57,8 @@ class JointModel:
         start = time.perf_counter()
         assembly, coarser = self.assembly(), self.graded()
         seconds = time.perf_counter() - start
-        key = storage.digest("sparse", self.scene.assembly_key, fingerprint([Path(__file__)], CODE))
-        key = self.springs.key(key) if self.springs else key
         like = coarser.assembly if coarser.work < WORTH * self.work else None
-        return SparsePrepared(assembly, key, seconds, self.scene.source_of, coarser=like)
+        return SparsePrepared(assembly, seconds, self.scene.source_of, coarser=like)
 
     @property
     def built(self) -> bool:

@@ -28,7 +28,7 @@ from .part import PartLoadEffect, PartModel
 from .plate import shape
 
 GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
-TOUCHED = 1.5  # elements around the place of a force
+SAME = 1e-6  # mm, by which a force on a mesh line may seem to be beside it
 
 
 @dataclass(frozen=True)
@@ -84,10 +84,13 @@ def part_stress(
     areas = np.multiply.outer(hy, hx).ravel()
     s = sum((2 * k + 1) * np.polynomial.legendre.Legendre.basis(k)(GAUSS[0]) ** 2 for k in range(4))
     sensitivity = scale * np.sqrt(max(1.0, 1.5 * (1 - nu)) * s**2 / (areas * rigidity))
-    sizes = np.stack(np.broadcast_arrays(*np.meshgrid(hx, hy)), axis=-1).reshape(-1, 2)
+    lines = [(g, np.searchsorted(g, at) - 1) for g, at in zip((plate.x, plate.y), places.T, strict=True)]
+    low, high = (  # the ends of an element and the next ones
+        np.column_stack([g[np.clip(k + ends, 0, len(g) - 1)] for g, k in lines]) for ends in (-1, 2)
+    )
     near = np.zeros(len(places), dtype=bool)
     for force in forces:
-        near |= (abs(places - force) <= TOUCHED * sizes).all(axis=1)
+        near |= ((low - SAME <= force) & (force <= high + SAME)).all(axis=1)
     return PartStress(name, places, components, sensitivity, near, np.zeros(len(places), dtype=np.intp))
 
 

@@ -32,7 +32,7 @@ from .node_table import listed, outliers
 from .plate import Plate
 from .superelement import Superelement, SuperelementTable
 from .superelement_rows import misfit
-from .surface import refuse_off, surface_of
+from .surface import SAME, refuse_off, surface_of
 
 LEVEL = np.cos(np.radians(10.0))
 STEEP = 0.1  # the least cosine between a normal and that of the plane
@@ -132,6 +132,8 @@ class SuperelementJoint:
 
     def faults(self) -> Faults:
         """Yield the faults of the contacts; faults of files are raised when these are read."""
+        from scipy.spatial import cKDTree
+
         wrong = list(wrong_contacts(self.names, self.contacts, self.pairs, at_one_place=False))
         for part in self.parts:
             steep = part.nodes.normal[part.contacts] @ self.axes[2] < STEEP
@@ -139,6 +141,11 @@ class SuperelementJoint:
                 value = f"normals of {steep.sum()} nodes, ids {listed(map(str, part.contact_ids[steep]))}"
                 allowed = "reversed? All normals point the same way, from the first part to the second"
                 wrong.append((f"part.{part.name}.nodes", value, allowed))
+            in_plane = (part.nodes.xyz[part.contacts] @ self.axes.T)[:, :2]
+            if twins := cKDTree(in_plane).query_pairs(SAME):
+                ids = " and ".join(map(str, part.contact_ids[list(min(twins))]))
+                allowed = "one contact node at a place of the junction: contact = 0 for the other face"
+                wrong.append((f"part.{part.name}.nodes", f"ids {ids}, one above the other", allowed))
         if not wrong:
             try:
                 _ = self.faces
@@ -238,6 +245,14 @@ class SuperelementJoint:
         W = {name: self.faces[name].surface.weights(points) for name in names}
         normals = W[along or part] @ self._normals[along or part]
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        if along not in ("", part):  # on the other part at the foot along that normal, if there is one
+            (start, end), n = (
+                (W[name] @ self.faces[name].xyz[:, 2] for name in (along, part)),
+                normals @ self.axes.T,
+            )
+            feet = points + ((end - start) * n[:, 2])[:, None] * n[:, :2]
+            there = np.where(self.covers((part,), feet)[:, None], feet, points)
+            W[part] = self.faces[part].surface.weights(there)
         return self._along(part, W[part], normals)
 
     def areas(self, part: str) -> Vector:

@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,6 @@ from problems.input.user_matrices import SMALL
 from problems.reporter import SILENT, Reporter
 from problems.stiffness import Vector, balanced_units
 from problems.stiffness.operator import Stiffness
-from problems.storage import fingerprint
 
 from .effect import Effect
 from .interface import places_of
@@ -94,9 +92,8 @@ class SuperelementModel:
             K = sp.block_diag([matrices[part] for part in group], format="csc")
             blocks.append(sp.csc_array(K + added[rows, rows] if self.springs else K))
         seconds = time.perf_counter() - start
-        key = storage.digest("sparse", self._key, fingerprint([Path(__file__)], ("problems/model",)))
         source_of = self.scene.source_of
-        return SparsePrepared(self._assembly(blocks), key, seconds, source_of, refuses_singular=True)
+        return SparsePrepared(self._assembly(blocks), seconds, source_of, refuses_singular=True)
 
     def dense(self, reporter: Reporter = SILENT) -> DensePrepared:
         """K with dense blocks. Raises InputError if contacts depend on one another."""

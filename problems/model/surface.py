@@ -179,7 +179,8 @@ Surface = Grid | Triangles
 
 
 def surface_of(nodes: Matrix) -> Surface:
-    """The surface of nodes (c, 2): a Grid if they form a full grid, turned or not, else Triangles.
+    """The surface of nodes (c, 2): a Grid if they form a full grid without bays, turned or not; else
+    Triangles.
 
     Raises ValueError if they are on a line.
     """
@@ -192,7 +193,9 @@ def surface_of(nodes: Matrix) -> Surface:
         (x, column), (y, row) = (_lines(axis) for axis in (nodes if turn is None else nodes @ turn).T)
         place = row * len(x) + column
         if len(place) == len(x) * len(y) == len(np.unique(place)):
-            return Grid(x, y, np.argsort(place), SAME, turn)
+            cells, cell = Triangles.of(nodes), np.diff(x).min() * np.diff(y).min()
+            full = cells.areas.sum() > np.ptp(x) * np.ptp(y) - cell / 2
+            return Grid(x, y, np.argsort(place), SAME, turn) if full else cells
     return Triangles.of(nodes)
 
 

@@ -68,7 +68,7 @@ def code_warnings(rows: pd.DataFrame) -> list[str]:
         doubts.append(f"The tables mix rows of different code of {listed([*mixed])}.")
     if other := int((~commits.isin(["", provenance()["commit"]])).sum()):
         which = "All rows were" if other == len(rows) else f"{other} of {len(rows)} rows {_was(other)}"
-        doubts.append(f"{which} measured with older code than the code that drew this report.")
+        doubts.append(f"{which} measured with other code than that which drew this report.")
     return doubts
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from decimal import Context, Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,13 @@ def upwards(bound: float, digits: int = 2) -> str:
     return f"{bound if shown is None else shown:.{digits - 1}e}"
 
 
+def percent_interval(interval: Sequence[float], decimals: int = 1) -> str:
+    """'94.0 to 98.5 %' of two shares, rounded outwards, so that what is printed covers the interval."""
+    ways = zip(interval, (ROUND_FLOOR, ROUND_CEILING), strict=True)
+    low, high = (Decimal(100 * share).quantize(Decimal(10) ** -decimals, way) for share, way in ways)
+    return f"{low} to {high} %"
+
+
 def position(place: Sequence[float], nodes: NDArray[np.float64]) -> str:
     """'(1077.93, 0) mm', to 0.01 mm; on nodes within less than a metre, to 1e-5 of their extent."""
     extent = float(np.ptp(nodes, axis=0).max())
@@ -78,6 +85,11 @@ def digits_beside(
 def error_beside(limit: float, error: float) -> str:
     """1.00004e-07 beside 1e-07: four digits, or as many as show an error on its side of a limit."""
     return f"{error:.{digits_beside(limit, error, least=4) - 1}e}"
+
+
+def limit_beside(error: float | None, limit: float) -> str:
+    """1e-07: three digits, or as many as show a limit on its side of an error."""
+    return f"{limit:.{3 if error is None else digits_beside(error, limit)}g}"
 
 
 def beside(limit: float, rounded: Callable[[float, int], float | None] = nearest) -> Callable[[object], str]:

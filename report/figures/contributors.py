@@ -53,7 +53,8 @@ def of_contacts(series: Series) -> Array:
 def of_forces(series: Series) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The rows of the largest force, and these with those of each fastener."""
     error, places = series.cases["force_error_N"].max(skipna=False), series.facts["fasteners"]
-    largest = indices(series, abs(series.forces).max(axis=1), error)
+    varying = series.forces[:, ~(np.ptp(series.forces, axis=0) == 0)]  # not those of clamps
+    largest = indices(series, abs(varying).max(axis=1, initial=0.0), error)
     pairs = zip(places, series.forces.T, strict=True)
     each = [indices(series, y, error).assign(**{k: at[k] for k in ("kind", "x", "y")}) for at, y in pairs]
     return largest, pd.concat([largest.assign(kind="largest"), *each])

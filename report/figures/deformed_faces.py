@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from report.document.numbers import significant
+from report.document.numbers import raised, significant
 from report.results.answer_record import pair_name
 
 from . import style
@@ -47,6 +47,8 @@ def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure 
     axes.plot_surface(X, Y, first + between, facecolors=colours.to_rgba(between), alpha=0.8, **look)
     axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="normal, mm")
     axes.locator_params(nbins=4)
-    figure.suptitle(f"{pair_name(seen.pair)}: at most {significant(gap.max())} mm apart", x=0.02, ha="left")
+    figure.suptitle(
+        f"{pair_name(seen.pair)}: at most {significant(raised(gap.max()))} mm apart", x=0.02, ha="left"
+    )
     figure.colorbar(colours, cax=figure.add_axes((0.88, 0.25, 0.02, 0.5)), label="gap left, mm")
     return figure

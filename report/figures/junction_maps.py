@@ -22,7 +22,7 @@ from report.document.escape import LONGEST_LABEL
 from report.document.verdict_colours import FAIL
 
 from . import style
-from .node_cells import Array, border, cell_edges, cells_of, grid_of
+from .node_cells import Array, border, cell_edges, cells_of, grid_of, largest_at_places
 
 Outlines = Sequence[tuple[NDArray[np.bool_], str, str]]  # a mask, its colour, its name in the legend
 Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
@@ -112,6 +112,7 @@ def _field(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappa
     """Draw a field on the nodes, each in its cell."""
     axes.set_aspect("equal")
     look: dict[str, Any] = {"norm": scale.norm, "cmap": scale.colours}
+    nodes, values = largest_at_places(nodes, values)
     if (grid := grid_of(nodes)) is None:
         drawn = PolyCollection(cells_of(nodes), array=values, edgecolors="face", linewidths=0.3, **look)
         axes.add_collection(drawn)
@@ -126,6 +127,7 @@ def _outlined(axes: Axes, nodes: Array, inside: NDArray[np.bool_], colour: str, 
     """Draw the border of some contacts, dark-rimmed on any colour."""
     if not inside.any():
         return
+    nodes, inside = largest_at_places(nodes, inside)
     look: dict[str, Any] = {"color": colour, "linewidth": 0.9}
     look |= {} if colour == RIM else {"path_effects": [withStroke(linewidth=1.7, foreground=RIM)]}
     axes.add_collection(LineCollection(list(border(cells_of(nodes), inside)), **look))

@@ -5,6 +5,8 @@ middles of the edges and triangles around its node, on a surface that leaves bay
 line have squares of their mean distance.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +25,14 @@ def grid_of(nodes: Array) -> TensorGrid | None:
     place = row * len(x) + column
     full = len(place) == len(x) * len(y) == len(np.unique(place)) and len(x) > 1 and len(y) > 1
     return (x, y, place) if full else None
+
+
+def largest_at_places(nodes: Array, values: NDArray[Any]) -> tuple[Array, NDArray[Any]]:
+    """The places of nodes, and the largest value at each: contacts of two pairs may lie above one another."""
+    places, first, at = np.unique(nodes.round(6), axis=0, return_index=True, return_inverse=True)
+    largest = values[first]
+    np.fmax.at(largest, at.ravel(), values)
+    return places, largest
 
 
 def cell_edges(nodes: Array) -> Array:

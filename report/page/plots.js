@@ -67,6 +67,10 @@ async function gapMap() {
     Object.entries(packed).map(async ([column, text]) => [column, await unpacked(text)])));
   if (turn !== drawing) return; // another map is asked for by now
   for (const name of ["xs", "ys"]) columns[name] = split(columns[name], columns.corners);
+  // Contacts of two pairs may lie above one another.
+  const largest = new Map(), place = k => `${columns.x[k]} ${columns.y[k]}`;
+  columns.value.forEach((value, k) => largest.set(place(k), Math.max(value, largest.get(place(k)) ?? -Infinity)));
+  columns.value = columns.value.map((_, k) => largest.get(place(k)));
   const above = at("threshold") === "" ? field.limit ?? Infinity : Number(at("threshold"));
   const fail = getComputedStyle(document.documentElement).getPropertyValue("--fail");
   const edge = Array.from(columns.value, value => value > above ? fail : "#00000000");

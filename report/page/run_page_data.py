@@ -181,15 +181,13 @@ def _banner(results: Results) -> Data:
 
 
 def _scenes(results: Results) -> list[Data]:
-    """The scenes in the order of the suite, on ladders, else by size and active contacts."""
+    """The rungs of ladders in the order of the suite, then the scenes by size and active contacts."""
     cells = results.cells.drop_duplicates("scene").sort_values(["n", "active", "scene"])
     scenes = cells.set_index("scene")
-    ordered = list(scenes.index)
-    if all(name.startswith(LADDERS) for name in ordered):
-        ordered = [name for name in results.suite.get("scenes", []) if name in scenes.index]
+    rungs = [name for name in results.suite.get("scenes", []) if _ladder(name) and name in scenes.index]
     return [
         {"scene": name, "ladder": _ladder(name), "heading": _heading(name, scenes.loc[name])}
-        for name in dict.fromkeys([*ordered, *scenes.index])
+        for name in dict.fromkeys([*rungs, *scenes.index])
     ]
 
 

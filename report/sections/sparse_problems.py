@@ -20,7 +20,8 @@ INF = float("inf")
 
 def section(results: Results) -> Section | None:
     """A line per method of ours, family and number of unknowns, and one of all of them."""
-    cells = results.cells[results.cells["scene"].str.startswith(SPARSE)]
+    cells = results.cells
+    cells = cells[cells["scene"].str.startswith(SPARSE) & (cells["status"] != "unsupported")]
     ours = cells[cells["owner"] == "ours"]
     if ours.empty:
         return None

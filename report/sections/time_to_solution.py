@@ -99,7 +99,9 @@ def ours_and_others(results: Results) -> pd.DataFrame:
     at, ours = [cells_by_stage["machine"], cells_by_stage["scene"], beside], cells_by_stage["owner"] == "ours"
     lines: list[dict[str, Any]] = []
     for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
-        taken = cells_by_stage[seconds].where(within).fillna(np.inf)
+        taken = cells_by_stage[seconds].where(within, np.inf)
+        if taken.isna().any():  # the seconds of a stage are not known
+            continue
         own = taken.where(ours & np.isfinite(taken))
         alone = own.where(beside == "").groupby(cells_by_stage["scene"]).transform("min")
         times = (taken / own.groupby(at).transform("min")).where(cells_by_stage["round"] == "")

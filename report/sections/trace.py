@@ -45,9 +45,11 @@ def section(results: Results) -> Section | None:
 
 
 def traces(cells: pd.DataFrame) -> pd.DataFrame:
-    """The stopped runs and those that end them, by `label` without the limit, with a finite `error`, mm."""
+    """The stopped runs and those that end them, by `label` without the limit, with a finite `error`, mm. Runs
+    that did not stop at their limit are left out: they are as the whole one.
+    """
     cells = named(cells.assign(variant=cells["variant"].str.replace(LIMITED, "", regex=True)))
     stopped = cells.groupby(["scene", "label"])["iteration_limit"].transform("count")
     lines = with_errors(cells[stopped > 0])
-    lines = lines[np.isfinite(lines["error"])]
+    lines = lines[np.isfinite(lines["error"]) & ~(lines["iterations"] > lines["iteration_limit"])]
     return lines.sort_values(["n", "scene", "label", "iteration_limit"], ignore_index=True)

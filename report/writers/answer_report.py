@@ -103,7 +103,8 @@ def _sheet(
     record: dict[str, Any], arrays: dict[str, Array], pictures: list[Path], tables: list[Table]
 ) -> Sheet:
     verdict, check = headline(record, arrays), record.get("allowed_gap") or {}
-    sure = [exactness(check.get("uncertainty_mm", record["error_bound_mm"]))]
+    error, bound = record["judged_error_mm"] or 0.0, record["error_bound_mm"]
+    sure = [exactness(check.get("uncertainty_mm", None if bound is None else bound + error))]
     sure += [f"{text}." for text in (record["grid"]["said"], check.get("beyond_scan")) if text]
     about = sure, origin(record), record.get("inputs", {}), pictures, tables, list(record.get("unusual", ()))
     return Sheet(str(record["title"]), verdict["kind"], verdict["text"], *about)

@@ -15,7 +15,7 @@ from report.document.escape import file_name
 from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
 from report.page.page_file import Data, banner, table_data
 from report.page.page_file import write as write_page
-from report.writers.sections_writer import written
+from report.writers.sections_writer import emptied, written
 
 NOTE = (
     "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
@@ -91,15 +91,16 @@ SOLVERS = [
 
 def write(out: Path, comparisons: list[Comparison]) -> Path:
     """Write the comparisons with one older run into the folder `out`, and return the path of the page."""
-    out.mkdir(parents=True, exist_ok=True)
+    emptied(out, "comparison.md")
     sections = [Section("How to read this", [Text(NOTE)])]
     for place, pair in enumerate(comparisons, start=1):
         blocks = _blocks(pair, f"{place}-" if len(comparisons) > 1 else "")
         sections.append(Section(f"{pair.old} → {pair.new}", blocks))
     lines = pd.concat([pair.table.assign(old=pair.old, new=pair.new) for pair in comparisons])
     title = f"Compared with {comparisons[0].old}"
+    new = [pair.rows[pair.rows["side"] == pair.new] for pair in comparisons]
     data: Data = {
-        "banner": _banner(pd.concat([pair.rows for pair in comparisons])),
+        "banner": _banner(pd.concat([comparisons[0].rows, *new[1:]])),
         "tables": [
             table_data(f"{pair.old} → {pair.new}", COLUMNS, pair.table, pair.summary) for pair in comparisons
         ],

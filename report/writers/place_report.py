@@ -11,7 +11,16 @@ from matplotlib.ticker import MaxNLocator
 from harness.results import records
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, facts_table, number, word
 from report.document.escape import quoted
-from report.document.numbers import beside, coordinate, counted, out_of, raised, significant, whole
+from report.document.numbers import (
+    beside,
+    coordinate,
+    counted,
+    out_of,
+    percent_interval,
+    raised,
+    significant,
+    whole,
+)
 from report.figures import style
 from report.figures.junction_maps import Map, larger_than, map_sheet, rooted
 from report.results.series_results import read as read_series
@@ -71,9 +80,9 @@ def _summary(record: dict[str, Any]) -> Table:
         "found": record["said"],
     }
     for n, sample in enumerate(record["samples"], start=1):
-        low, high = (f"{100 * value:.4g}" for value in sample["interval"])
         said = f"{counted(sample['fasteners'], 'fastener')}: kept by {sample['kept']}, with "
-        said += f"{100 * record['confidence']:g} % confidence {low} to {high} % of all"
+        interval = percent_interval(sample["interval"], 2)
+        said += f"{100 * record['confidence']:g} % confidence {interval} of all"
         for what, numbers in (("beyond the limit", sample["failing"]), ("not proven", sample["unproven"])):
             if numbers:
                 some = ", ".join(map(str, numbers[:FEW])) + (", …" if len(numbers) > FEW else "")
@@ -154,7 +163,8 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
     maps = [
         Map(text, nodes, gap, scale, [larger_than(limit, gap)], marks) for text, nodes, gap, marks in shown
     ]
-    caption = f"*The gap at each contact that {100 * share:.4g} % of the fresh cases keep*, before and after."
+    of = f"{'fresh ' * bool(record['samples'])}cases"
+    caption = f"*The gap at each contact that {100 * share:.4g} % of the {of} keep*, before and after."
     table = pd.DataFrame({"x_mm": shown[0][1][:, 0], "y_mm": shown[0][1][:, 1]})
     table = table.assign(**{f"{name}_mm": gap for name, (_, _, gap, _) in zip(names, shown, strict=True)})
     return [Figure("before-and-after", caption, map_sheet(maps, 1)[0], table)]

@@ -181,7 +181,9 @@ def _swept(series: Series, key: str) -> Figure:
     drawing.legend(loc="outside right upper")
     caption = f"*The largest and the mean gap per case against {key}*, shaded: the range over the other keys."
     error = 2 * series.cases["gap_error_mm"].astype(float).max(skipna=False)  # NaN if one is unknown
-    if np.ptp(ranges[[f"{name}_{end}" for name in GAPS for end in ("min", "max")]], axis=0).max() <= error:
+    others = [name for name in series.swept if name != key]
+    alike = series.cases.groupby(others or np.zeros(len(series.cases)))[list(GAPS)]
+    if len(ranges) > 1 and (alike.max() - alike.min()).to_numpy().max() <= error:
         caption += (
             f" **{key} changes neither**, to what is proven: closed contacts carry the difference, or it "
             "acts where no gap is left."

@@ -109,7 +109,7 @@ class Printed:
         rows = records(table.data)
         columns = [[column.heading, *(plain(column.show(row)) for row in rows)] for column in table.columns]
         kept = [texts for texts in columns if len(rows) == 1 or len(set(texts[1:])) > 1] or columns
-        same = [f"{texts[0]}: {texts[1].replace('_', ' ')}" for texts in columns if texts not in kept]
+        same = [f"{texts[0]}: {texts[1]}" for texts in columns if texts not in kept]
         self.title = "; ".join([table.caption.split("*")[1].rstrip(".:"), *same])
         self.file = f"{table.name}.csv"
         self.heads, *self.lines = zip(*kept, strict=True)

@@ -25,6 +25,7 @@ from problems.forms.assembly import Assembly
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
+from report.document.numbers import percent_interval
 
 PAIRS = [{"pair": ["a", "b"], "start": 0, "stop": 2}, {"pair": ["b", "tool"], "start": 2, "stop": 4}]
 CASES = 12
@@ -160,9 +161,9 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     done = harness(*command, "--allow-gap", allowed, "--out", tmp_path)
     assert done.exit_code == 4, done.output
     assert f"in 5 of {CASES} cases" in done.stdout
-    low, high = interval_of(CASES - 5, CASES)
+    interval = percent_interval(interval_of(CASES - 5, CASES), 2)
     assert f"Surely within {allowed:g} mm: {CASES - 5} of {CASES} cases" in done.stdout
-    assert f"between {low:.2%} and {high:.2%}" in done.stdout
+    assert f"the share of joints is {interval}, with 95 %" in done.stdout
     assert f"at {larger.any(axis=0).sum()} of {gaps.shape[1]} contacts" in done.stdout
     assert f"in case {gaps.max(axis=1).argmax()}." in done.stdout
     said = f"FAIL: the gap is larger than {allowed:g} mm in 5 of {CASES} cases"
@@ -194,7 +195,7 @@ def test_a_case_without_an_answer_is_in_the_verdict(gap: tuple[Path, np.ndarray]
     assert done.exit_code == 1
     assert f"Surely within 9 mm: {CASES - 1} of {CASES} cases" in done.stdout
     low, _ = interval_of(CASES - 1, CASES)
-    assert f"between {low:.2%} and 100.00%" in done.stdout
+    assert f"the share of joints is {percent_interval((low, 1.0), 2)}, with 95 %" in done.stdout
     assert (
         f"In 1 of {CASES} cases it cannot be told whether a gap is larger than 9 mm: there is no"
         in done.stdout

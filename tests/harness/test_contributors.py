@@ -26,6 +26,7 @@ from problems.model.fastener_forces import fastener_forces
 from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from report.document.blocks import Figure, Text
+from report.document.numbers import percent_interval
 from report.figures.contributors import indices, of_contacts
 from report.results.series_results import Series, read
 from report.writers.series_contributors import contributors_of
@@ -122,8 +123,8 @@ def test_what_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert [row["case"] for row in series_file.rows(out)] == [*range(64)]
     within = [row["max_gap_mm"] <= 0.4 for row in series_file.rows(out)]
     kept = sum(within[k] for k in range(64) if k % 4 < 2)
-    low, high = interval_of(kept, 32)
-    assert f"between {low:.2%} and {high:.2%}" in " ".join(done.output.split())
+    interval = percent_interval(interval_of(kept, 32), 2)
+    assert f"the share of joints is {interval}, with 95 %" in " ".join(done.output.split())
     table = pd.read_csv(out / "report/contributors.csv")
     pd.testing.assert_frame_equal(table, of_gaps(read(out)), rtol=1e-12)
     assert table["input"].tolist() == ["pressure.value", "initial_gap.random"]

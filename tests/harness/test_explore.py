@@ -353,6 +353,8 @@ def test_the_raster_shows_every_contact_where_it_is() -> None:
     raster = Raster.of(grid[order])
     np.testing.assert_array_equal(raster.image(gap[order]), gap.reshape(4, 9))
     np.testing.assert_array_equal([raster.low, raster.high], [[-1.5, -2.5], [25.5, 17.5]])
+    stack = Raster.of(np.concatenate([grid, grid]))
+    np.testing.assert_array_equal(stack.image(np.r_[gap, 35 - gap]), np.maximum(gap, 35 - gap).reshape(4, 9))
     scattered = random.uniform(0, 100, (400, 2))
     scattered = scattered[np.hypot(*(scattered - 50.0).T) > 25]
     raster = Raster.of(scattered)

@@ -89,6 +89,7 @@ def test_a_row_out_of_time_stands_until_there_is_more_of_it():
     solver = Description(["primal"], "1", "c")
     assert [outdated(each, m, solver) for each in rows] == [False, True, True]
     assert not outdated(rows[1], replace(m, time_limit_s=39.0), solver)
+    assert not outdated(rows[0], m, replace(solver, code="", failure="no network"))
 
 
 def test_a_written_suite_may_have_a_key_of_an_older_version(tmp_path):

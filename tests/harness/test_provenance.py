@@ -14,10 +14,12 @@ from suite_runs import rows_of, said_by
 
 from harness.measurement.suite_run import run as run_suite
 from harness.results import series_file
+from harness.results.atomic_output import refuse_changed
 from harness.results.provenance import HOOK_VARIABLES, ROOT, fingerprints, provenance
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from problems import __version__
+from problems.errors import InputError
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene_files import read_scene
 
@@ -131,6 +133,11 @@ def test_two_files_of_one_name_have_a_hash_each(tmp_path: Path, monkeypatch: pyt
     for k, file in enumerate(files):
         file.write_text(str(k))
     assert len({*fingerprints(files).values()}) == 2
+    before = fingerprints(files)
+    refuse_changed(files, before)
+    files[1].write_text("another")
+    with pytest.raises(InputError, match="changed meanwhile"):
+        refuse_changed(files, before)
 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_the_table_of_a_scene_and_its_options_are_drawn(scene: Path, tmp_path: P
         for count in counts:
             done = harness("series", scene, "--cases", count, *more, "--out", tmp_path / out)
             assert done.exit_code == 4, done.output
-    assert "the share of joints is between" in done.output
+    assert "the share of joints is " in done.output
     once = rows_of(tmp_path / "once")
     assert [row["verdict"] for row in once] == ["within"] * 9
     for row, again in zip(once, rows_of(tmp_path / "twice"), strict=True):

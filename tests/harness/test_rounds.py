@@ -214,6 +214,12 @@ def test_a_round_searches_for_nothing_and_has_no_series(tmp_path: Path, key: str
         read_suite(str(path))
 
 
+def test_a_trace_searches_for_nothing(tmp_path: Path) -> None:
+    path = tiny_joint.write_suite(tmp_path, '[[solver]]\nname = "newton"\ntolerances = "auto"\n', trace=True)
+    with pytest.raises(InputError, match=r"solver\.0\.tolerances"):
+        read_suite(str(path))
+
+
 LATE = """
 import time
 import numpy as np

@@ -16,11 +16,10 @@ import tiny_joint
 from commands import harness, wrong_usage
 from forked_processes import forked_command
 from refusals import refusal_of
-from rich.console import Console
 from suite_runs import changed, gated, is_alive, moved, rows_of, said_by, wait_for
 
 from harness.measurement import task
-from harness.measurement.solver_descriptions import Description, resumed
+from harness.measurement.solver_descriptions import Description, valid_and_old
 from harness.measurement.suite_run import run
 from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite, read_written
@@ -151,8 +150,16 @@ def test_no_row_of_a_scene_that_has_changed_stays(copy: Path) -> None:
     old = [row | {"scene_key": "older"} for row in others[:2]]
     plan = expand(read_written(copy / "suite.toml"))
     solvers = {("exact", ""): Description(["dual"], "1", "code")}
-    assert resumed(copy, [*others, *old], plan, solvers, Console(quiet=True)) == others == rows_of(copy)
-    assert [row["key"] for row in records.read(copy / records.OUTDATED)] == [row["key"] for row in old]
+    assert valid_and_old([*others, *old], plan, solvers) == (others, old)
+
+
+def test_rows_that_are_set_aside_are_missing(copy: Path, folder: Path) -> None:
+    """A run without their solver would make the gate forget them."""
+    suite, rows = read_suite(str(folder / "small.toml")), rows_of(copy)
+    records.rewrite(copy / records.MEASUREMENTS, [*rows[:2], rows[2] | {"scene_key": "older"}, *rows[3:]])
+    narrower, before = suite.model_copy(update={"solver": suite.solver[:1]}), rows_of(copy)
+    assert rows[2]["key"] in str(refusal_of(said_by, run, narrower, copy))
+    assert rows_of(copy) == before
 
 
 @pytest.mark.parametrize("suite_is_read", [True, False])
@@ -407,4 +414,6 @@ def test_a_case_of_a_series_comes_after_those_before_it() -> None:
     assert [m.case for m in found] == list(range(2 * (batched.entry.batched or 0)))
     assert {m.process for m in found} == {batched.process}
     single = next(m for m in plan if not m.entry.batched and m.case == 3)
-    assert [m.case for m in of_key(plan, single.key)] == [0, 1, 2, 3]
+    alone = of_key(plan, single.key)
+    assert [m.case for m in alone] == [0, 1, 2, 3]
+    assert alone[0].entry.cases == 4  # so that the suite beside them plans no others

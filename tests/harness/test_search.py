@@ -267,8 +267,8 @@ def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str,
     return asked | steps | judged | {"n": 4, "owner": "library"}
 
 
-@pytest.mark.parametrize(("seconds", "repeats"), [(0.1, 5), (3.0, 3), (30.0, 1)])
-def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float, repeats: int) -> None:
+@pytest.mark.parametrize(("seconds", "repeats"), [(0.1, 5), (3.0, 3), (30.0, 1), (None, 1)])
+def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float | None, repeats: int) -> None:
     suite = tiny_joint.suite(tmp_path).model_copy(update={"repeats": "auto"})
     plan = [m for m in expand(suite) if m.solver == suite.solver[0].name]
     rows = [row_of(plan[0], seconds)]

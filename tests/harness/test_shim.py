@@ -40,6 +40,7 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.model.fastener_forces import fastener_forces
 from problems.reporter import SILENT
 from problems.scene_files import read_scene
+from report.document.numbers import percent_interval
 from report.writers import shim_report
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
@@ -315,7 +316,7 @@ def test_joints_pass_if_the_interval_of_their_share_begins_at_it(failing: int, s
         low, _ = interval_of(count - failing, count)
         needed = 1 - failing / count if cases is gaps or share == 1 else low
         assert passed == (needed >= share)
-        assert f"interval {100 * low:.1f} to " in words
+        assert f"interval {percent_interval((low, 1.0)).partition(' to')[0]} to " in words
         assert ("no shim is needed" in words) == (not failing)
         assert ("needs a shim" in words) == (0 < failing < count)
 

@@ -10,6 +10,7 @@ import tiny_joint
 from commands import wrong_usage
 from refusals import refusal_of
 
+from harness.commands import suite_runs
 from harness.measurement.suite_run import batches
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand, of_key, with_key
@@ -202,6 +203,17 @@ def test_of_entries_that_an_option_brings_together_the_first_counts(tmp_path: Pa
     assert [m.entry.gated for m in expand(suite)] == [True]
     (tmp_path / "written.toml").write_text(to_toml(suite))
     assert expand(read_written(tmp_path / "written.toml"))
+
+
+def test_a_folder_hides_no_suite_and_is_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran = list[tuple[str, Path]]()
+    monkeypatch.setattr(suite_runs, "run_suite", lambda suite, to, *_: ran.append((suite.name, to)) or 0)
+    monkeypatch.chdir(tmp_path)
+    for name in ("gate", "mine"):
+        Path(name).mkdir()
+        Path(name, "suite.toml").write_text(to_toml(read_suite("methods")))
+        suite_runs.run(name)
+    assert ran == [("gate", Path("results/gate")), ("methods", Path("mine"))]
 
 
 def test_unknown_suite_names_the_known_ones() -> None:

@@ -189,6 +189,12 @@ def test_all_that_is_wrong_with_a_file_and_its_table_is_said_at_once(tmp_path: P
     assert all("0 … 100 × 0 … 50 mm" in fault.allowed for fault in all_faults[-2:])
 
 
+def test_a_list_beside_a_file_is_the_scene_s(tmp_path: Path) -> None:
+    (tmp_path / "holes.csv").write_text("x,y\n10,10\n90,10\n50,25\n")
+    (fault, *_) = faults(tmp_path, 'kind = "fasteners"\npreload = [1, 1, 1, 1, -1]\nfile = "holes.csv"')
+    assert (fault.where, fault.key) == (str(tmp_path / "scene.toml"), "effect[0] (fasteners).preload.4")
+
+
 @pytest.mark.parametrize(
     ("rows", "keys"),
     [

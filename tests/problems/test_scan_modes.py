@@ -9,8 +9,10 @@ from refusals import refusal_of
 from scipy.linalg import subspace_angles
 from small_joints import JOINT, make_scene
 
+from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
+from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.scan_modes import scan_modes
 
 SCENE = make_scene(JOINT)
@@ -79,6 +81,21 @@ def test_workers_are_sent_the_modes_and_not_the_scans(tmp_path: Path) -> None:
     assert pickle.loads(sent).key == cases.key
     write(tmp_path, gaps + 1e-9)
     assert scan_modes(SCENE, pattern, 3, 4).key != cases.key
+
+
+def test_scans_and_scatter_are_between_the_parts_of_the_gap_that_they_replace(tmp_path: Path) -> None:
+    """Not on the contacts with a tool."""
+    joint, m = JOINT.with_contacts((("a", "b"), ("b", "tool"))), len(NODES)
+    gap = InitialGap(kind="initial_gap", mean=0.1, between=("a", "b"))
+    pattern = made(tmp_path)[1]
+    cases = scan_modes(make_scene(joint, gap), pattern, 1, 0)
+    scan = MeasuredGap(kind="measured_gap", between=("a", "b"), points=((0, 0, 1), (9, 0, 1), (0, 9, 1)))
+    drawn = random_gaps(make_scene(joint, scan), 1, 0, sd=0.1, correlation_length=50.0).load(0).g
+    for g in (cases.load(0).g, cases.mean, drawn):
+        assert g[:m].all()
+        assert not g[m:].any()
+    with pytest.raises(InputError, match="at most one can be random"):
+        scan_modes(make_scene(joint, gap, gap.model_copy(update={"between": ("b", "tool")})), pattern, 1, 0)
 
 
 def test_faults_of_all_scans_at_once(tmp_path: Path) -> None:

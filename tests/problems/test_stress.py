@@ -244,6 +244,15 @@ def test_forces_at_points_are_named() -> None:
     assert not part.near_force.all()
 
 
+def test_the_element_of_a_force_and_its_neighbours_are_marked_whatever_their_sizes() -> None:
+    plate = Plate(np.arange(9) * 50.0, np.array([-300.0, -200, -100, 0, 30, 60, 90, 120]), T, E, NU)
+    model, u = PartModel(plate, (), range(3, 8)), np.zeros(plate.size)
+    for x, low, high in ((120.0, 50, 200), (150.0, 50, 250)):  # on a mesh line, both elements are its
+        stress = part_stress("p", model, (), u, np.array([[x, -20.0]]))
+        near = ((stress.places > [low, -200]) & (stress.places < [high, 30])).all(axis=1)
+        np.testing.assert_array_equal(stress.near_force, near)
+
+
 def test_whether_any_stress_is_told_needs_no_factor(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("problems.model.joint_model.JointModel.interior", lambda *_: pytest.fail("factored"))
     scene = read_scene("gallery/installed-fasteners")

@@ -113,6 +113,11 @@ def test_all_files_are_checked_at_once(tmp_path: Path) -> None:
 PAIRS: dict[str, tuple[Callable[[Path], list[Tables]], str, str]] = {
     "reversed normals": (lambda f: two(f, normals=-UP), "24 nodes, ids 1, 2", "point the same way"),
     "one reversed": (lambda f: two(f, normals=changed(UP, 6, [0, 0, -1])), "1 nodes, ids 7", "reversed?"),
+    "two faces": (
+        lambda f: two(f, xyz=changed(NODES, 1, NODES[0] + [0, 0, 3])),
+        "ids 1 and 2",
+        "contact = 0",
+    ),
     "too far": (lambda f: two(f, xyz=NODES + np.array([0, 0, 7.5])), "24 too far: 1 (7.5 mm), 2", "5 mm"),
     "beside": (lambda f: two(f, xyz=NODES + np.array([900.0, 0, 0])), "24 are beyond its surface", "pairing"),
     "on a line": (

@@ -26,6 +26,7 @@ from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
+from problems.model.scene import JointScene
 from problems.scene_files import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.base import Answer
@@ -151,6 +152,17 @@ def test_reference_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path.write_bytes(content)
     with pytest.raises(pytest.fail.Exception, match="second time"):
         reference(made, case)
+
+
+def test_the_key_of_a_sparse_matrix_is_of_its_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that nothing proven outlives a change of the code of an effect."""
+    scene = read_scene("gallery/padded-panel")
+    assert isinstance(scene, JointScene)
+    keys = [prepared(replace(scene), form="sparse").key for _ in range(2)]  # each with a model of its own
+    effect, own = type(scene.stiffness_effects[0]), type(scene.stiffness_effects[0]).stiffness
+    monkeypatch.setattr(effect, "stiffness", lambda self, plate: (1 + 2**-52) * own(self, plate))
+    keys.append(prepared(replace(scene), form="sparse").key)
+    assert keys[0] == keys[1] != keys[2]
 
 
 def test_a_row_says_why_it_cannot_be_judged(tmp_path: Path) -> None:

@@ -242,6 +242,10 @@ def test_contacts_on_a_line_or_in_one_place_have_cells() -> None:
     twice = np.array([[0.0, 0], [4, 0], [1, 3], [4, 0]])
     cells = node_cells.cells_of(twice)
     assert [area(cell) for cell in cells] == pytest.approx([2.0] * 4)
+    places, largest = node_cells.largest_at_places(twice, np.array([1.0, 2, 3, 4]))
+    assert dict(zip(map(tuple, places.tolist()), largest.tolist(), strict=True)) == {
+        (0, 0): 1, (1, 3): 3, (4, 0): 4,
+    }  # fmt: skip
 
 
 def test_every_marker_of_the_report_has_one_on_the_page() -> None:

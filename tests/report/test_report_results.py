@@ -56,7 +56,7 @@ def test_rows_of_different_code_in_one_table_are_said_first(tmp_path: Path) -> N
         "(1 row) and a commit that is not recorded (1 row)."
     )
     assert unclean == "1 row was measured with uncommitted changes to that commit."
-    assert older == "1 of 3 rows was measured with older code than the code that drew this report."
+    assert older == "1 of 3 rows was measured with other code than that which drew this report."
     text = write(tmp_path).read_text("utf-8")
     assert text.index(mixed) < text.index("|")
     assert re.search(rf"\| commit +\| {HERE} \(clean\), {OTHER} \(with uncommitted changes\) and not", text)
@@ -64,7 +64,7 @@ def test_rows_of_different_code_in_one_table_are_said_first(tmp_path: Path) -> N
 
 def test_rows_of_older_code_and_of_an_unknown_commit_are_said(tmp_path: Path) -> None:
     (older,) = said(tmp_path / "old", row(LOW, "a", commit=OTHER, clean=True))
-    assert older == "All rows were measured with older code than the code that drew this report."
+    assert older == "All rows were measured with other code than that which drew this report."
     assert said(tmp_path / "unknown", row(LOW, "a")) == ["No row records the commit it was measured with."]
     (installed,) = said(tmp_path / "installed", row(LOW, "a", commit="0.2.0"))
     assert installed == older

@@ -17,7 +17,9 @@ from report.document.numbers import (
     digits_beside,
     error_beside,
     extent,
+    limit_beside,
     nearest,
+    percent_interval,
     position,
     proven_to,
     raised,
@@ -222,6 +224,12 @@ def test_no_bound_is_rounded_down_or_far() -> None:
     assert (raised(None), raised(np.inf)) == (None, None)
 
 
+def test_an_interval_of_shares_is_rounded_outwards() -> None:
+    assert percent_interval((0.96349, 0.99132)) == "96.3 to 99.2 %"
+    assert percent_interval((0.0, 1.0), 2) == "0.00 to 100.00 %"
+    assert percent_interval((0.94996, 0.94996), 2) == "94.99 to 95.00 %"
+
+
 @pytest.mark.parametrize(
     ("rounded", "values", "said"),
     [
@@ -237,6 +245,7 @@ def test_a_value_is_shown_on_its_side_of_a_limit(rounded: Any, values: Any, said
 def test_an_error_is_shown_on_its_side_of_a_limit() -> None:
     errors = [error_beside(1e-7, value) for value in (2e-7, 1.000004e-7, 1e-7, 3.21e-12)]
     assert errors == ["2.000e-07", "1.000004e-07", "1.000e-07", "3.210e-12"]
+    assert (limit_beside(None, 1e-7), limit_beside(1.234e-6, 1.2349e-6)) == ("1e-07", "1.235e-06")
     assert error_beside(1.235e-7, 1.2351e-7) == "1.2351e-07"  # three digits are on its side, four are not
     assert [digits_beside(0.123856, 0.1238564, least) for least in (3, 6)] == [3, 7]
 

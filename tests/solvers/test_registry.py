@@ -100,7 +100,7 @@ def write(folder: Path, text: str, name: str = "mine.py") -> Path:
 
 
 def test_a_plugin_goes_by_the_name_of_its_file(tmp_path: Path) -> None:
-    path = write(tmp_path, GOOD)
+    path = write(tmp_path, GOOD + "Another = Diagonal\n")
     solver = make_solver("mine", {"sweeps": 3}, path)
     assert type(solver).__name__ == "Diagonal"
     assert vars(solver)["sweeps"] == 3
@@ -116,6 +116,7 @@ def test_a_plugin_goes_by_the_name_of_its_file(tmp_path: Path) -> None:
         (GOOD + GOOD.replace("Diagonal", "Second"), ["Diagonal, Second", "not several"]),
         (GOOD + "    ) = 3\n", ["line 15", "not Python"]),
         ("import numpy\n1 / 0\n", ["line 2", "ZeroDivisionError"]),
+        ("import numpy\nnumpy.linalg.inv('')\n", ["line 2", "LinAlgError"]),
         ("from solvers.base import Solver\nclass Half(Solver):\n    pass\n", ["'Half'", "define solve("]),
     ],
 )
