@@ -49,13 +49,15 @@ def settings_of(library: str) -> list[str]:
     lines = []
     for (form, variant), cell in rows[rows["solver"] == library].groupby(["form", "variant"], sort=False):
         within = cell[cell["verdict"] == "within"]
-        late = cell[cell["status"] == "time_limit"]
+        late, full = (cell[cell["status"] == status] for status in ("time_limit", "memory_limit"))
         said, at = "no tolerance suffices", "–"
         if len(within):
             best = within.loc[within["tolerance"].idxmax()]
             said, at = significant(best[list(STEPS)].sum(), 3), tidy_power(best["tolerance"])
         elif len(late):
             said = f"more than {significant(late['time_limit_s'].max(), 2)}"
+        elif len(full):
+            said = f"more than {full['memory_limit_mib'].max() / 2**10:g} GiB"
         lines.append(f"| {form} | {variant or 'as set'} | {said} | {at} |")
     return lines
 
