@@ -331,7 +331,7 @@ def test_the_error_of_a_spring_s_force_is_that_of_x_and_of_rounding() -> None:
     scene, x = make_scene(JOINT, rivets), np.random.default_rng(0).standard_normal(JOINT.size[0])
     springs, off = Springs.of(scene), []
     for j, found in enumerate(fastener_forces(scene, x)):
-        t = springs.T[:, j].toarray().ravel()
+        t = springs.T[:, [j]].toarray().ravel()
         reached = sum(Fraction(t[i]) * Fraction(x[i]) for i in np.flatnonzero(t))
         exact = Fraction(0.1) + Fraction(springs.k[j]) * (Fraction(0.7) - reached)
         off.append(abs(Fraction(found["force_N"]) - exact))
