@@ -46,6 +46,15 @@ def test_the_estimate_is_about_the_distance_to_a_far_finer_mesh(plan: str) -> No
     assert 0 < three.order < 4
 
 
+def test_fasteners_on_nodes_stay_where_they_are_on_another_mesh() -> None:
+    pattern = {"columns": 4, "rows": 2, "edge": 13, "on_nodes": True}
+    found = strips({"kind": "fasteners", "preload": 400.0, "pattern": pattern})
+    scene = found.problem.scene
+    assert isinstance(scene, JointScene)
+    _, other, _ = on_mesh(found, remeshed(scene.joint, 0.5))
+    np.testing.assert_array_equal(other.marks(), scene.marks())
+
+
 def test_a_coarser_mesh_keeps_the_sides_and_one_element_at_least() -> None:
     joint = load_scene("gallery/measured-gap").joint
     coarse = remeshed(joint, 0.5)

@@ -282,6 +282,25 @@ def test_contacts_of_curved_surfaces_are_along_their_normals(tmp_path: Path) -> 
     assert solved(scene).gap.min() > -1e-9
 
 
+def test_no_rigid_motion_of_both_parts_stretches_a_fastener_between_tilted_faces(tmp_path: Path) -> None:
+    """They are drawn 5 mm apart, and the plane of the junction stays that of x and y."""
+    angle = np.radians(9.0)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    first = flat(JOINT.nodes) @ turn.T
+    normals, K = np.tile(turn[:, 2], (len(first), 1)), 50 * np.eye(3 * len(first))
+    places = first, first + 5 * normals
+    parts = [
+        write_part(tmp_path, name, K, xyz, normals, dofs=[1, 2, 3])
+        for name, xyz in zip("ab", places, strict=True)
+    ]
+    joint = scene_from(parts, pairing={"distance": 6.0}).joint
+    points = np.array([[150.0, 60.0], [200.0, 33.0]])
+    for turning in np.eye(3):
+        a, b = (np.cross(turning, xyz).ravel() for xyz in places)
+        stretch = joint.deflection("a", points) @ a - joint.deflection("b", points, "a") @ b
+        assert abs(stretch).max() < 1e-9
+
+
 def test_a_part_off_its_place_moves_as_a_rigid_body_along_inclined_normals(tmp_path: Path) -> None:
     """By Aᵀx of the motion of all its nodes; a shift by the cosine of each normal, half of it at 60°."""
     joint = scene_from(cylinders(tmp_path, np.pi / 3, rotation(), MOVED)).joint

@@ -352,6 +352,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "problems/model/fastener_forces.py": {
         "size.sum(axis=0) * error_mm + rounding": ("size.sum(axis=0) * error_mm", "rounding"),
     },
+    "problems/model/superelement_joint.py": {'along not in ("", part)': ("False",)},
     "problems/forms/preparation_stages.py": {
         "*(() if K.dense else K.arrays)": ("*()",),
     },
@@ -369,6 +370,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "problems/model/stress.py": {
         "of_xx - bent": ("of_xx",),
+        "for ends in (-1, 2)": ("for ends in (0, 1)",),
         "thickness / 2 / (1 - nu**2)": ("thickness / (1 - nu**2)",),
         "of_xx + nu * of_yy": ("of_xx - nu * of_yy", "of_xx"),
         "(1 - nu) * of_xy": ("of_xy",),
@@ -460,6 +462,7 @@ TESTS = {
     ),
     "problems/model/effect.py": ("problems/test_stages.py",),
     "problems/model/fastener_forces.py": ("problems/test_effects.py",),
+    "problems/model/superelement_joint.py": ("problems/test_superelements.py",),
     "problems/forms/preparation_stages.py": ("proofs/test_reference.py", "problems/test_stages.py"),
     "problems/model/stage_answers.py": ("problems/test_stages.py",),
     "problems/model/scene.py": ("problems/test_stages.py",),
