@@ -105,7 +105,7 @@ class Units:
         scaled = {"f": self.D * load.f / self.U, "g": self.R * load.g / self.U}
         if isinstance(load, DualLoadCase):
             scaled["p"] = self.R * load.p / self.U
-        return read_only(replace(load, **scaled, energy=self.U**2, length=self.length))
+        return read_only(replace(load, **scaled, energy=self.U * self.U, length=self.length))
 
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector, Vector, Vector | None]:
         """λ, gaps and x of a warm start, in these units."""

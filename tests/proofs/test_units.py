@@ -192,6 +192,7 @@ def test_the_duality_gap_may_have_as_many_newton_millimetres_as_the_tolerance_ha
     units = Units.of(given).of_loads([load])
     scaled_load = units.load(load)
     assert scaled_load.energy == units.U**2 > 1
+    assert replace(units, length=1e200 * units.delta).load(load).energy == np.inf  # and no error
     assert gap_tolerance(1e-6, scaled_load) == 1e-6 / units.U**2
     assert gap_tolerance(1e-10, scaled_load) == 1e-13  # rounding
     assert gap_tolerance(1e-300, scaled_load) == 1e-300  # asked for more than that
