@@ -4,7 +4,6 @@ with maps, and a sheet to file.
 
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from report.figures.node_cells import grid_of
 from report.page.answer_page_data import FASTENER, FORCE, answer_data, facts, headline, stage_table
 from report.page.page_file import write as write_page
 from report.results.answer_record import (
-    STRESS,
     closed_contacts,
     contacts,
     fasteners,
@@ -73,8 +71,7 @@ def write(directory: Path) -> Path:
     drawn = {name: Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()}
     history = stage_table(record, arrays)
     if len(history.data):
-        columns = [column for column in history.columns if column.heading != STRESS]
-        blocks.append(replace(history, columns=columns))
+        blocks.append(history)
     blocks += [
         drawn.pop(name) for name in ("history", "stage-gaps", "gap", "section", "deformed") if name in drawn
     ]
