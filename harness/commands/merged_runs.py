@@ -55,7 +55,7 @@ def merge(names: Sequence[str], out: Path) -> Path:
         if older:
             records.rewrite(out / records.OUTDATED, older)
         records.rewrite(out / records.MEASUREMENTS, rows)
-        for file in (folder / SUITE for folder in map(Path, names)):  # last: it is refused without rows
-            if file.is_file():
-                shutil.copy(file, out / SUITE)
+        for folder in map(Path, names):
+            if (folder / SUITE).is_file():
+                shutil.copy(folder / SUITE, out)  # last: it is refused without rows
     return report(out)
