@@ -115,7 +115,7 @@ def _matrices(scene: Scene, console: Console) -> None:
         console.print(f"Sparse form by default: {choice.why}.")
     assembly = prepared(last_scene(scene), form=choice.form).assembly
     print_facts(scene.name, assembly, console)
-    digits = digits_of(assembly)
+    digits = digits_of(scene, assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
 
 
@@ -178,9 +178,11 @@ def print_facts(name: str, assembly: Assembly, console: Console) -> None:
         console.print(f"{note}.", style="yellow")
 
 
-def digits_of(assembly: Assembly) -> int:
-    """The digits that the entries of K seem to have, at most 16: the fewest of a block."""
-    return min(apparent_digits(K.data if sp.issparse(K) else K) for K in assembly.K.matrices)
+def digits_of(scene: Scene, assembly: Assembly) -> int:
+    """The digits that the entries of K seem to have, at most 16: the fewest of a superelement or a block."""
+    parts = getattr(getattr(scene, "joint", None), "parts", ())  # without the springs between them
+    given = [part.stiffness for part in parts] or assembly.K.matrices
+    return min(apparent_digits(K.data if sp.issparse(K) else K) for K in given)
 
 
 def digits_sentence(problem: ReferenceProblem, solved: bool) -> tuple[str, bool]:
@@ -189,7 +191,7 @@ def digits_sentence(problem: ReferenceProblem, solved: bool) -> tuple[str, bool]
     solved : at the reference; else at displacements of about its size.
     """
     data = problem.prepared
-    digits = digits_of(data.assembly)
+    digits = digits_of(problem.scene, data.assembly)
     if digits == DOUBLE:
         return "The entries of K have all digits of double precision", False
     if solved:

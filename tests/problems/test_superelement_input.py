@@ -9,6 +9,7 @@ import pytest
 from refusals import refusal_of
 from superelements import Array, Tables, flat, scene_from, solved, with_bay, write_nodes, write_part
 
+from harness.scene.validate import digits_of
 from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.load_cases.measured_gaps import measured_gaps
@@ -146,6 +147,11 @@ def test_nodes_beyond_the_other_part_and_too_far_from_it_are_no_contacts(tmp_pat
     (said,) = scene.unusual
     assert "farther apart than 5 mm = 4" in said
     assert "19 (9 mm)" in said
+
+
+def test_springs_between_parts_do_not_hide_the_few_digits_of_k(tmp_path: Path) -> None:
+    scene = scene_from(two(tmp_path, HELD.round(4)), {"kind": "installed_fasteners", "points": [[50, 20]]})
+    assert digits_of(scene, prepared(scene).assembly) == 6
 
 
 def test_a_node_far_from_all_others_is_told(tmp_path: Path) -> None:
