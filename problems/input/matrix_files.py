@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 
-from .matrix_entries import from_entries, read_entries, refuse_twice
+from .matrix_entries import contradictions, from_entries, read_entries, refuse_twice
 from .text_files import read_bytes
 
 NUMBERS, TEXT = [*"fiubc"], [*"US"]  # kinds of the entries of arrays
@@ -80,9 +80,10 @@ def _supported(numbers: Any) -> Any:
 
 
 def write(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write arrays and sparse matrices, by name, into an .npz."""
+    """Write arrays and sparse matrices, by name, into an .npz, where X_format says that X is by columns."""
+    layouts = {f"{name}_format": "csc" for name, M in arrays.items() if sp.issparse(M)}
     with path.open("wb") as file:
-        np.savez(file, **packed(arrays))
+        np.savez(file, **packed(arrays) | layouts)
 
 
 def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
@@ -120,15 +121,20 @@ def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
         if sp.issparse(M):
             _refuse_damaged(name, M)
             refuse_twice(path, name, M)
+            unsaid = {f"{name}_indptr", f"{name}_format"} & files == {f"{name}_indptr"} and name != "K"
+            if unsaid and M.shape[0] == M.shape[1] and contradictions(sp.csr_array(M.real, dtype=float)):
+                allowed = "'csc', if the parts are its columns: a square matrix may be either"
+                raise InputError.one(path, f"{name}_format", None, allowed)
     return chosen
 
 
 def texts_of(path: Path) -> list[str]:
-    """The names of the arrays of text in an .npz."""
+    """The names of the arrays of text in an .npz, but for the X_format of a sparse X."""
     if path.suffix.lower() != ".npz":
         return []
     with np.load(path) as archive:
-        return [name for name in archive.files if _kind(archive, name) in TEXT]
+        texts = [name for name in archive.files if _kind(archive, name) in TEXT]
+        return [name for name in texts if f"{name.removesuffix('_format')}_indptr" not in archive.files]
 
 
 def _kind(archive: Any, name: str) -> str:

@@ -246,6 +246,9 @@ def test_parts_that_say_that_they_are_compressed_rows_are_refused() -> None:
     problem = {"K": K, "f": np.ones(2), "g": np.ones(2)}
     for kind in (sp.csc_array, sp.csr_array):
         parts = {f"A_{part}": getattr(kind(A), part) for part in ("data", "indices", "indptr", "shape")}
+        np.savez("mine.npz", **problem, **parts)
+        with pytest.raises(InputError, match=r"A_format = None: .csc., if the parts are its columns"):
+            read_matrices({"problem": Path("mine.npz")})
         np.savez("mine.npz", **problem, **parts, A_format=kind(A).format)
         if kind is sp.csc_array:
             read_back = read_matrices({"problem": Path("mine.npz")})[0].A
