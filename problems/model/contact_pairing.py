@@ -32,8 +32,9 @@ class Pairing:
 
     nodes (c,) : the contacts, as nodes of a. W (c, nodes of b) : the weights of b's nodes at their feet.
     apart (c,) : their distances t, mm. beyond : the number of nodes of a without a foot on b. far : t, mm, of
-    each node that is too far from b. crossed : triangles of a whose feet have the other orientation.
-    lost : nodes near b for which no foot was found.
+    each node that is too far from b. over_bays : how many of `beyond` are near b, over a bay or a hole of it.
+    crossed : triangles of a whose feet have the other orientation. lost : nodes near b for which no foot was
+    found.
     """
 
     nodes: Indices
@@ -41,6 +42,7 @@ class Pairing:
     apart: Vector
     beyond: int = 0
     far: dict[int, float] = field(default_factory=dict)
+    over_bays: int = 0
     crossed: tuple[tuple[int, ...], ...] = ()
     lost: tuple[int, ...] = ()
 
@@ -55,6 +57,7 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
     """The contacts of two faces. distance : the largest |t| of a contact, mm."""
     t, foot, has_foot, away = _feet(a, b)
     on = has_foot & b.surface.covers(foot)
+    over_bays = int((has_foot & (abs(t) <= distance) & b.surface.is_open(foot)).sum())
     near = on & (abs(t) <= distance)
     nodes = np.flatnonzero(near)
     far = {int(k): float(t[k]) for k in np.flatnonzero(on & ~near)}
@@ -65,7 +68,7 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
     crossed = tuple(tuple(each) for each in turned.tolist())
     lost = np.flatnonzero(~has_foot & (away <= distance))
     W = b.surface.weights(foot[nodes])
-    return Pairing(nodes, W, t[nodes], int((~on).sum()), far, crossed, tuple(lost.tolist()))
+    return Pairing(nodes, W, t[nodes], int((~on).sum()), far, over_bays, crossed, tuple(lost.tolist()))
 
 
 def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask, Vector]:

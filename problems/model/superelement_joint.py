@@ -184,6 +184,9 @@ class SuperelementJoint:
             if pairing.far:
                 usual = f"none: they are no contacts: {self._distances(pair)}"
                 yield f"{name}, nodes farther apart than {self.distance:g} mm", len(pairing.far), usual
+            if pairing.over_bays:
+                usual = f"none, unless {pair[1]} is open there: they are no contacts"
+                yield f"{name}, nodes over a bay or a hole of {pair[1]}", pairing.over_bays, usual
             if len(pairing.apart) and (apart := float(np.median(pairing.apart))) < -self.distance / 100:
                 usual = f"0 or more, with {pair[1]} on the side of {pair[0]} to which its normals point"
                 yield f"{name}, median distance along the normal", apart, usual

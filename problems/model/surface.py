@@ -59,6 +59,10 @@ class Grid:
         inside = (points >= low - self.same) & (points <= high + self.same)
         return np.asarray(inside.all(axis=1))
 
+    def is_open(self, points: Matrix) -> Mask:
+        """(k,) which points are in a bay or a hole: none."""
+        return np.zeros(len(points), dtype=bool)
+
     def _turned(self, points: Matrix) -> Matrix:
         return points if self.turn is None else points @ self.turn
 
@@ -144,6 +148,10 @@ class Triangles:
         points = points - self.middle
         inside: Mask = (self.tree.query(points)[0] <= SAME) | (self._owners(points) >= 0)
         return inside
+
+    def is_open(self, points: Matrix) -> Mask:
+        """(k,) which points are in a bay or a hole: among the nodes, but not on the surface."""
+        return (self.mesh.find_simplex(points - self.middle) >= 0) & ~self.covers(points)
 
     @property
     def areas(self) -> Vector:

@@ -149,6 +149,12 @@ def test_nodes_beyond_the_other_part_and_too_far_from_it_are_no_contacts(tmp_pat
     assert "19 (9 mm)" in said
 
 
+def test_nodes_over_a_strip_that_may_be_a_bay_are_told(tmp_path: Path) -> None:
+    xyz = changed(NODES, (slice(None), 0), np.tile([0, 5, 10, 90, 95, 100], 4))
+    (said,) = scene_from(two(tmp_path, xyz=xyz)).unusual
+    assert "nodes over a bay or a hole of b = 16" in said
+
+
 def test_springs_between_parts_do_not_hide_the_few_digits_of_k(tmp_path: Path) -> None:
     scene = scene_from(two(tmp_path, HELD.round(4)), {"kind": "installed_fasteners", "points": [[50, 20]]})
     assert digits_of(scene, prepared(scene).assembly) == 6
