@@ -172,6 +172,8 @@ class SuperelementJoint:
         return listed(f"{ids[k]} ({t:.3g} mm)" for k, t in far.items())
 
     def unusual(self) -> Faults:
+        if self.axes[2, 2] <= -LEVEL:
+            yield "y of points", f"-y of nodes, as normals of {self.names[0]} are along -z", "y of nodes"
         for part in self.parts:
             if rank := misfit(part.stiffness, part.nodes, (part.node, part.dof), part.dofs):
                 what = "median rank by distance of the nodes that a row of K ties most"

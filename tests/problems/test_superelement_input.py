@@ -155,6 +155,11 @@ def test_nodes_over_a_strip_that_may_be_a_bay_are_told(tmp_path: Path) -> None:
     assert "nodes over a bay or a hole of b = 16" in said
 
 
+def test_normals_along_minus_z_turn_y_of_points_around_and_that_is_told(tmp_path: Path) -> None:
+    (said,) = scene_from([write_part(tmp_path, name, HELD, NODES, -UP) for name in "ab"]).unusual
+    assert said.startswith("joint.y of points = -y of nodes, as normals of a are along -z")
+
+
 def test_springs_between_parts_do_not_hide_the_few_digits_of_k(tmp_path: Path) -> None:
     scene = scene_from(two(tmp_path, HELD.round(4)), {"kind": "installed_fasteners", "points": [[50, 20]]})
     assert digits_of(scene, prepared(scene).assembly) == 6
