@@ -1,10 +1,12 @@
 """Pairs the contact nodes of one face with their feet on another.
 
 The foot of a node p along its normal n is p + tn, where that line meets the second face. Both faces are in
-the axes of the junction's plane; the third coordinate is the height above it.
+the axes of the junction's plane; the third coordinate is the height above it. A foot that hardly misses the
+border, as places in files are rounded, is moved onto the face.
 """
 
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +17,7 @@ from .surface import Surface
 from .surface_cells import cross
 
 STEPS, SETTLED = 50, 1e-10  # of the search for a foot; mm
+BORDER = 1e-3  # of b's usual spacing, by which rounded places may miss its border
 
 
 @dataclass(frozen=True)
@@ -56,8 +59,12 @@ def with_tool(a: Face) -> Pairing:
 def paired(a: Face, b: Face, distance: float) -> Pairing:
     """The contacts of two faces. distance : the largest |t| of a contact, mm."""
     t, foot, has_foot, away = _feet(a, b)
-    on = has_foot & b.surface.covers(foot)
-    over_bays = int((has_foot & (abs(t) <= distance) & b.surface.is_open(foot)).sum())
+    onto, reach = foot, BORDER * np.sqrt(b.surface.areas.mean())
+    for step in product((-reach, reach), repeat=2):
+        moved = np.where(b.surface.covers(onto)[:, None], onto, onto + step)
+        onto = np.where(b.surface.covers(moved)[:, None], moved, onto)
+    on = has_foot & b.surface.covers(onto)
+    over_bays = int((has_foot & ~on & (abs(t) <= distance) & b.surface.is_open(foot)).sum())
     near = on & (abs(t) <= distance)
     nodes = np.flatnonzero(near)
     far = {int(k): float(t[k]) for k in np.flatnonzero(on & ~near)}
@@ -67,7 +74,7 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
     turned = corners[cross(u, v) <= 0]
     crossed = tuple(tuple(each) for each in turned.tolist())
     lost = np.flatnonzero(~has_foot & (away <= distance))
-    W = b.surface.weights(foot[nodes])
+    W = b.surface.weights(onto[nodes])
     return Pairing(nodes, W, t[nodes], int((~on).sum()), far, over_bays, crossed, tuple(lost.tolist()))
 
 

@@ -155,6 +155,16 @@ def test_nodes_over_a_strip_that_may_be_a_bay_are_told(tmp_path: Path) -> None:
     assert "nodes over a bay or a hole of b = 16" in said
 
 
+def test_nodes_on_a_common_border_stay_contacts_where_places_are_rounded(tmp_path: Path) -> None:
+    parts = []
+    for name, *count in (("a", 6, 4), ("b", 8, 3)):
+        x, y = np.meshgrid(*map(np.linspace, (0, 0), (100, 50), count))
+        turned = (x + 1j * y).ravel() * np.exp(0.5j)
+        xyz = flat(np.column_stack([turned.real, turned.imag]).round(4))
+        parts.append(write_part(tmp_path, name, HELD, xyz))
+    assert scene_from(parts).joint.size[1] == 24
+
+
 def test_normals_along_minus_z_turn_y_of_points_around_and_that_is_told(tmp_path: Path) -> None:
     (said,) = scene_from([write_part(tmp_path, name, HELD, NODES, -UP) for name in "ab"]).unusual
     assert said.startswith("joint.y of points = -y of nodes, as normals of a are along -z")
