@@ -164,9 +164,10 @@ class JointScene(Scene):
         if not self.stages:
             usual = [("stage", "a column", "in a scene with stages; here all points act at once")]
             told += [(effect.kind, iter(usual)) for effect in self.effects if any(effect._stages)]
-            usual = [("table", "that of an effect above", "another one: both act")]
-            tables = [vars(effect) | {"name": None} for effect in self.effects]
-            told += [(one.kind, iter(usual)) for k, one in enumerate(self.effects) if tables[k] in tables[:k]]
+        usual = [("table", "that of an effect above", "another one: both act")]
+        always = [one for one in self.effects if not (self.stages and (one.name or one._stages))]
+        tables = [vars(one) | {"name": None} for one in always]
+        told += [(one.kind, iter(usual)) for k, one in enumerate(always) if tables[k] in tables[:k]]
         return [
             f"{where}.{key} = {shown} is unusual; usual is {usual}"
             for where, some in told

@@ -24,6 +24,7 @@ def unusual(*effects: dict[str, Any], **joint: Any) -> list[str]:
 FASTENER = {"kind": "fasteners", "preload": 3601.0, "points": [[200.0, 60.0]]}
 CLAMP = {"kind": "clamps", "clamping_force": 10.0, "radius": 401.0, "points": [[200.0, 60.0]]}
 WEIGHT = {"kind": "self_weight", "part": "a"}
+TWICE = {"joint": JOINT, "effect": [WEIGHT, WEIGHT]}
 SOFT = {"part": [PART | {"young": 70.0}, PART | {"name": "b", "young": 70e9}]}
 
 
@@ -45,6 +46,7 @@ SOFT = {"part": [PART | {"young": 70.0}, PART | {"name": "b", "young": 70e9}]}
         (lambda: unusual(FASTENER), ["fasteners.preload = 3601", "3600 N on 3 mm"]),
         (lambda: unusual(CLAMP), ["clamps.radius = 401", "at most 400 mm"]),
         (lambda: unusual(WEIGHT, WEIGHT | {"name": "again"}), ["self_weight.table = that of an"]),
+        (lambda: scene_of(TWICE | {"stage": [{"name": "rivet"}]}).unusual, ["self_weight.table = that"]),
     ],
 )
 def test_the_value_and_what_is_usual(found: Any, words: list[str]) -> None:
