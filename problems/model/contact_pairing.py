@@ -59,12 +59,13 @@ def with_tool(a: Face) -> Pairing:
 def paired(a: Face, b: Face, distance: float) -> Pairing:
     """The contacts of two faces. distance : the largest |t| of a contact, mm."""
     t, foot, has_foot, away = _feet(a, b)
-    onto, reach = foot, BORDER * np.sqrt(b.surface.areas.mean())
+    onto, off = foot.copy(), np.flatnonzero(~b.surface.covers(foot))
+    reach = BORDER * np.sqrt(b.surface.areas.mean())
     for step in product((-reach, reach), repeat=2):
-        moved = np.where(b.surface.covers(onto)[:, None], onto, onto + step)
-        onto = np.where(b.surface.covers(moved)[:, None], moved, onto)
-    on = has_foot & b.surface.covers(onto)
-    over_bays = int((has_foot & ~on & (abs(t) <= distance) & b.surface.is_open(foot)).sum())
+        onto[off] = foot[off] + step
+        off = off[~b.surface.covers(onto[off])]
+    on = has_foot & ~np.isin(np.arange(len(t)), off)
+    over_bays = int((has_foot & (abs(t) <= distance))[off][b.surface.is_open(foot[off])].sum())
     near = on & (abs(t) <= distance)
     nodes = np.flatnonzero(near)
     far = {int(k): float(t[k]) for k in np.flatnonzero(on & ~near)}
