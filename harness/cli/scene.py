@@ -156,14 +156,15 @@ def _of_parts(parts: list[Path], scene: Path) -> dict[str, str]:
     """What the scene says of parts whose K are in these files, their nodes beside them."""
     from harness.scene.scene_file import relative
 
-    tables = ""
-    for part in parts:
+    tables, names = "", [part.stem for part in parts]
+    if len(set(names)) < len(names):  # such as wing/K.mtx and frame/K.mtx
+        names = [part.absolute().parent.name for part in parts]
+    for part, name in zip(parts, names, strict=True):
         there = relative(part, scene.parent)
         nodes = Path(there).with_suffix(".csv").as_posix()
         files = f"superelement = {_quoted(there)}\nnodes = {_quoted(nodes)}\n"
-        tables += f"[[joint.part]]\nname = {_quoted(part.stem)}\n{files}"
-        tables += DOFS
-    return {"TITLE": _quoted(" on ".join(part.stem for part in parts)), "PARTS": tables.rstrip()}
+        tables += f"[[joint.part]]\nname = {_quoted(name)}\n{files}{DOFS}"
+    return {"TITLE": _quoted(" on ".join(names)), "PARTS": tables.rstrip()}
 
 
 def _quoted(text: str) -> str:

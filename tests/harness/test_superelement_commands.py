@@ -80,6 +80,14 @@ def test_the_starter_names_files_through_links(tmp_path: Path) -> None:
     assert (tmp_path / "here" / part["superelement"]).is_file()
 
 
+def test_parts_whose_files_are_called_alike_have_the_names_of_their_folders(tmp_path: Path) -> None:
+    files = [tmp_path / name / "K.mtx" for name in ("wing", "frame")]
+    succeeds("init", "--superelements", *files, tmp_path / "scene.toml")
+    written = tomllib.loads((tmp_path / "scene.toml").read_text())
+    assert [part["name"] for part in written["joint"]["part"]] == ["wing", "frame"]
+    assert written["title"] == "wing on frame"
+
+
 def test_validate_says_what_there_is(folder: Path) -> None:
     told = succeeds("validate", folder / "edited.toml")
     for said in (
