@@ -72,7 +72,7 @@ class SolverEntry(BaseModel):
     what is not ours, so that ratios are of one machine and hour.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, serialize_by_alias=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, serialize_by_alias=True, allow_inf_nan=False)
 
     name: str
     forms: Annotated[list[Form], NonEmpty] | None = None

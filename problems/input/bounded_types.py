@@ -55,6 +55,7 @@ Name = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=ONE
 VALUE, WORD = "a value", "a word"
 #: Tags of a parameter that may be a number or a list of numbers.
 NUMBER, NUMBERS = "a number", "numbers"
+TAGS = (VALUE, WORD, NUMBER, NUMBERS, "float", "list", "dict")  # the last ones of a JSON value
 
 
 def resolved(path: Path) -> Path:
@@ -91,7 +92,7 @@ def validation_faults(
     for item in items:
         if item["loc"] in above:
             continue  # a consequence of a fault inside it
-        keys = [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD, NUMBER, NUMBERS))]
+        keys = [prefix, *(str(part) for part in item["loc"] if part not in TAGS)]
         key = ".".join(filter(None, keys))
         value = None if item["type"] == "missing" else item["input"]
         unit, allowed = _unit(model, item["loc"]), _allowed(item, model)

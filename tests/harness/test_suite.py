@@ -362,6 +362,14 @@ def test_only_true_and_false_are_truth_values(tmp_path: Path) -> None:
         read_suite(str(path))
 
 
+def test_an_option_that_no_row_can_hold_is_refused(tmp_path: Path) -> None:
+    """JSON has no infinity: a search found none of its rows again."""
+    text = '[[solver]]\nname = "exact"\noptions = { rho = inf, steps = [1, { last = nan }] }\n'
+    faults = refusal_of(read_suite, str(tiny_joint.write_suite(tmp_path, text))).faults
+    assert [fault.key for fault in faults] == ["solver.0.options.rho", "solver.0.options.steps.1.last"]
+    assert {fault.allowed for fault in faults} == {"must be a finite number"}
+
+
 def test_a_scene_from_outside_is_for_every_entry() -> None:
     """The scenes of an entry are some of the suite's own."""
     suite, every = read_suite("default"), {entry.name for entry in read_suite("default").solver}
