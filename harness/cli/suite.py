@@ -64,7 +64,7 @@ def run(
     ] = None,
     plugin: Plugin = None,
     scheduler: Scheduler = None,
-    key: Annotated[str | None, option("KEY", "Only the row with this key, measured again.")] = None,
+    key: Annotated[str | None, option("KEY", "Only the row with this key, and its earlier repeats.")] = None,
 ) -> None:
     """Measure a suite and write rows, answers and report.
 

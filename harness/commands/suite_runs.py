@@ -67,7 +67,7 @@ def run(
     scheduler : str, optional
         Dask workers: local:N, or the address of a scheduler; by default this machine.
     key : str, optional
-        Only the row with this key, measured again.
+        Only the row with this key, measured again after its earlier repeats.
     reporter : Reporter, optional
         With the console of a ConsoleReporter, rows are shown as they come; silent by default.
 

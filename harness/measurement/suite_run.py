@@ -61,7 +61,7 @@ def run(
     plan = expand(suite)
     if key is not None:
         plan = of_key(plan, key)
-        suite = suite.model_copy(update={"solver": [plan[0].entry]})
+        suite = suite.model_copy(update={"scenes": [plan[0].source], "solver": [plan[0].entry]})
     folders, outputs = ("answers", "scenes", "logs"), ("report", *other_suite(directory, suite))
     with records.locked(directory, folders=folders, outputs=outputs):
         rows = rows_in(directory, console)

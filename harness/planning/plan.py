@@ -218,22 +218,22 @@ def with_key(suite: Suite, key: str) -> Suite:
 
 
 def of_key(plan: Sequence[Measurement], key: str) -> list[Measurement]:
-    """The measurement with this key, of an entry that plans no other tolerance. Raises InputError.
+    """The measurement with this key after its earlier repeats, of an entry that plans no others.
 
     A load case of a series comes after the earlier ones of its process, because its start depends on them.
+    Raises InputError.
     """
     chosen = next((m for m in plan if m.key == key), None)
     if chosen is None:
         raise _unknown(plan[0].suite.name, key)
+    at_once, repeats = chosen.entry.batched or 1, chosen.repeat + 1
+    end = inf if chosen.case is None else (chosen.case // at_once + 1) * at_once
+    processes = {replace(chosen, repeat=k).process for k in range(repeats)}
+    needed = [m for m in plan if m.process in processes and (m.case or 0) < end]
     only = {"forms": [chosen.form], "tolerances": [chosen.tolerance], "threads": [chosen.threads]}
-    entry = chosen.entry.model_copy(update=only | {"repeats": chosen.repeat + 1})
-    if chosen.case is None:
-        return [replace(chosen, entry=entry)]
-    batched = chosen.entry.batched
-    end = (chosen.case // (batched or 1) + 1) * (batched or 1)
-    same = [m for m in plan if m.process == chosen.process and m.case is not None and m.case < end]
-    entry = entry.model_copy(update={"cases": len(same)})
-    return [replace(m, entry=entry) for m in same]
+    cases = None if chosen.case is None else len(needed) // repeats
+    entry = chosen.entry.model_copy(update=only | {"repeats": repeats, "cases": cases})
+    return [replace(m, entry=entry) for m in needed]
 
 
 def _unknown(suite: str, key: str) -> InputError:

@@ -398,6 +398,16 @@ def test_the_row_is_measured_again_and_compared(copy: Path, tmp_path: Path) -> N
     assert harness("compare", copy, again, "--key", KEY, "--max-slowdown", 1000).exit_code == 0
 
 
+def test_what_is_measured_again_by_its_key_is_all_that_the_suite_beside_it_plans(tmp_path: Path) -> None:
+    """Of a later repeat the earlier ones, too; no scene with whose name that of the row's begins."""
+    tiny_joint.write_problem(tmp_path / "tiny b.npz")
+    suite = tiny_joint.suite(tmp_path, scenes=["tiny.npz", "tiny b.npz"], repeats=3)
+    keys = [f"tiny b exact dual tol=1e-09 threads=1 repeat={k}" for k in range(2)]
+    assert said_by(lambda console: run(suite, tmp_path / "out", console, key=keys[1]))[0] == 0
+    assert [row["key"] for row in rows_of(tmp_path / "out")] == keys
+    assert gated(tmp_path / "out")[0] == 0
+
+
 @pytest.mark.parametrize(
     "key", ["tiny exact", "tiny gi dual tol=1e-06 threads=1 repeat=0", "", KEY + " case=1"]
 )
