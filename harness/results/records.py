@@ -56,6 +56,11 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
+def was_killed(row: Row) -> bool:
+    """Whether SIGKILL ended the solver's process, as where memory ran out: a further run tries again."""
+    return row.get("status") == "crashed" and "SIGKILL" in (row.get("message") or "")
+
+
 def append(path: Path, *rows: Row) -> None:
     """Append one line per row and force them to disk; on failure (a full disk) restore the file."""
     rest = memoryview("".join(to_line(row) + "\n" for row in rows).encode())

@@ -162,11 +162,9 @@ def states(directory: Path, job: Job) -> NDArray[np.int8]:
 
 def is_open(row: Row, job: Job) -> bool:
     """Whether a case without an answer is tried again: its limit is wider now, or memory ran out."""
-    status = row.get("status")
-    limit = LIMITS.get(status or "")
-    if limit:
+    if limit := LIMITS.get(row.get("status") or ""):
         return bool(row.get(limit, 0) < getattr(job, limit))  # without one, the system had no more memory
-    return status == "crashed" and "SIGKILL" in (row.get("message") or "")
+    return records.was_killed(row)
 
 
 def summary(rows: Iterable[Row], cases: int, console: Console) -> int:

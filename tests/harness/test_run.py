@@ -141,6 +141,16 @@ def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path)
     assert len(rows_of(copy)) == 4
 
 
+def test_a_row_whose_process_was_killed_is_measured_again(copy: Path, folder: Path) -> None:
+    rows = rows_of(copy)
+    rows[2] |= {"status": "crashed", "message": "killed by SIGKILL", "verdict": "no_answer", "answer": None}
+    rows[3] |= {"status": "crashed", "message": "killed by SIGSEGV"}
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    _, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
+    assert "1 row, because the scene, the solver or the limits have changed since, or a process was" in text
+    assert [row["status"] for row in rows_of(copy)[2:]] == ["crashed", "solved"]
+
+
 def test_no_row_of_a_scene_that_has_changed_stays(copy: Path) -> None:
     """Whatever its solver and round, planned or not; those of the scene as it is, and of others, do."""
     first = rows_of(copy)[0]
