@@ -15,6 +15,7 @@ from report.figures import style
 #: A picture or table beside a page, as the page names it; a bracket of a quoted text has a backslash.
 LINK = re.compile(r"(?<!\\)\]\(([^()/\\]+\.(?:png|csv))\)")
 BESIDE = ("index.html", "sheet.pdf")
+TALLEST = 2**16 - 1  # pixels: more are not drawn by Matplotlib 3.9, nor shown by browsers
 
 
 def written(
@@ -39,7 +40,8 @@ def written(
     with style.applied():
         for block in (block for section in sections for block in section.blocks):
             if isinstance(block, Figure):
-                picture(block.drawing).savefig(path.parent / f"{block.name}.png", dpi=style.DPI)
+                dpi = min(style.DPI, TALLEST / block.drawing.get_figheight())
+                picture(block.drawing).savefig(path.parent / f"{block.name}.png", dpi=dpi)
             if isinstance(block, Figure | Table) and block.name and block.data is not None:
                 csv_frame(block.data).to_csv(path.parent / f"{block.name}.csv", index=False)
     for name, table in files.items():

@@ -10,6 +10,7 @@ from urllib.parse import parse_qs
 
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure as Drawing
 from matplotlib.image import imread
 from synthetic_results import HIGH, LOW, everything, no_answer, results, row, sweep, table, write_rows
 
@@ -175,6 +176,13 @@ def test_blocks_of_two_sections_have_no_file_in_common(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"same\.csv would be written by the sections 'One' and 'Two'"):
         written(tmp_path / "report.md", "Both", sections)
     assert not [*tmp_path.iterdir()]
+
+
+def test_a_picture_is_no_taller_than_what_can_be_drawn_and_shown(tmp_path: Path) -> None:
+    """As of a trace on a hundred scenes."""
+    tall = Drawing(figsize=(0.1, 500.0))
+    written(tmp_path / "report.md", "", [Section("", [Figure("tall", "", tall)])])
+    assert imread(tmp_path / "tall.png").shape[0] < 2**16
 
 
 def test_a_series_without_an_answer_has_no_seconds_per_assembly(tmp_path: Path) -> None:
