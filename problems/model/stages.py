@@ -135,7 +135,7 @@ class StagePlan:
                     yield f"{where}[{number}].name", name, allowed
         kinds = {effect.kind for effect in self.effects if effect.name is None}
         for number, effect in enumerate(self.effects):
-            if effect.name == "contacts":
+            if (effect.name or effect.kind) == "contacts":
                 yield f"effect[{number}].name", effect.name, "another name: the forces of contacts have it"
             elif effect.name in kinds:
                 allowed = "another name: that of a kind calls its effects that have no name"

@@ -23,6 +23,7 @@ from problems.model.fastener_forces import fastener_forces
 from problems.model.interface import AnyJoint
 from problems.model.scene import JointScene
 from problems.model.stage_answers import stage_scenes
+from problems.model.stages import StagePlan
 from problems.scene_files import read_scene
 
 
@@ -303,6 +304,13 @@ def test_bad_stages(stages: list[Tables], rivets: Tables, where: str, allowed: s
     (line,) = str(refusal_of(joined, stages, effects, joint)).split("\n")
     assert where in line
     assert allowed in line
+
+
+def test_an_effect_whose_kind_is_contacts_needs_a_name() -> None:
+    """One of the user's own: its forces were hidden by those of the contacts."""
+    scene = joined([])
+    own = scene.effects[2].model_copy(update={"kind": "contacts", "name": None})
+    assert [key for key, *_ in StagePlan([own], [], scene.joint).faults()] == ["effect[0].name"]
 
 
 def test_all_bad_stages_at_once(tmp_path: Path) -> None:
