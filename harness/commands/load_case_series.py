@@ -15,7 +15,7 @@ from harness.results.provenance import fingerprints
 from harness.results.records import Row
 from harness.results.schema import SERIES
 from harness.scene.allowed_gap import check_series, refuse_unusable
-from harness.scene.solution import Source, load_scene
+from harness.scene.solution import Source, load_scene, refuse_other_units
 from harness.series.derivatives import derivatives
 from harness.series.load_case_source import DEFAULT, RANDOM, GapCases
 from harness.series.run import run
@@ -120,7 +120,7 @@ def run_series(
     directory, solver = Path(out), options.solver
     refuse_text("run_series", sweep=sweep)
     refuse_unusable(allow_gap_mm)
-    read = load_scene(scene)
+    refuse_other_units("series", read := load_scene(scene))
     cases = cases if sweep else replace(cases, random=cases.laws(read))
     faults = cases.faults(sweep)
     if sweep and cases.count is not None:

@@ -19,7 +19,7 @@ from harness.verification.reference_problem import ReferenceProblem, open_proble
 from problems.errors import Fault, InputError
 from problems.forms import FORMS, Form
 from problems.forms.assembly import Matrix, Vector
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import JointScene, ManufacturedScene, Scene
 from problems.model.stage_answers import Elongations, locked, through
 from problems.reporter import SILENT, Reporter
 from problems.scene_files import read_scene, scene_of
@@ -96,10 +96,11 @@ class Solution:
 
     @property
     def gap_error_mm(self) -> Vector:
-        """(m,) how far each gap is from the exact one at most, mm; of a scene with stages in the last one."""
+        """(m,) how far each gap is from the exact one at most, in its unit; with stages, in the last one."""
         if self.stages:
             return self.stages[-1].gap_error_mm
-        problem, bound = self.problem, self.error_bound_mm
+        problem = self.problem
+        bound = self.error_bound_mm / float(np.min(problem.reference.unit_mm))
         return GapError.of(problem.prepared.assembly)(problem.load.g, self.unknowns, bound)
 
     @property
@@ -312,6 +313,13 @@ def _solved(
         problem=problem,
         scene=scene,
     )
+
+
+def refuse_other_units(where: str, scene: Scene) -> None:
+    """Raise InputError if a scene is in other units than mm, as some rungs of ladders are."""
+    made = scene.made if isinstance(scene, ManufacturedScene) else None
+    if made is not None and not (np.equal(made.unit_mm, 1).all() and np.equal(made.gap_unit_mm, 1).all()):
+        raise InputError.one(where, "scene", scene.name, f"one in mm, not: {scene.title}")
 
 
 def refuse_not_positive(where: str, **numbers: float) -> None:

@@ -20,7 +20,7 @@ from problems.scene_files import read_scene
 
 from . import allowed_gap, mesh_error
 from .answer_record import arrays_of, is_of_plates, recorded, summary
-from .solution import refuse_not_positive, solve
+from .solution import refuse_not_positive, refuse_other_units, solve
 from .validate import print_unusual
 
 TOLERANCE = 1e-9  # of a named solver, by default
@@ -59,6 +59,8 @@ def solve_into(
         raise InputError.one("--tolerance", "tolerance", tolerance, "needs --solver NAME")
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
+    if allow_gap_mm is not None:
+        refuse_other_units("--allow-gap", scene)
     refuse_unwritable(out, scene.sources)
     refuse_inputs([out / name for name in OUTPUTS], scene.sources)
     refuse_other_command(out, PAGE, OUTPUTS)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import wrong_usage
 from suite_runs import gated, moved, rows_of, said_by
 
 from harness.measurement.suite_run import run
@@ -12,6 +13,7 @@ from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import expand
 from harness.planning.suite import Suite, read_suite
 from harness.results import records
+from harness.scene.solution import solve
 from problems.errors import InputError
 
 WIDE, REFUSED = "hard/conditioning/1e+10", "hard/duplicates/copies"
@@ -73,3 +75,11 @@ def test_rungs_are_meant_by_their_prefix_alone() -> None:
     assert "hard/parts/one-node" in some
     with pytest.raises(InputError, match="hard/conditioning/1e"):
         overridden(suite, Overrides(scenes=("hard/conditioning/1e+07",)))
+
+
+def test_gaps_in_other_units_than_mm_are_held_to_no_limit(tmp_path: Path) -> None:
+    """One of 0.46 mm passed 0.3 mm; the error of each is in its own unit."""
+    for words in (("solve", "hard/units/m-N", "--allow-gap", 0.3), ("series", "hard/units/contacts")):
+        assert "one in mm, not: Two parts" in wrong_usage(*words, "--out", tmp_path / "out")
+    exact, answer = solve("hard/units/um-N"), solve("hard/units/um-N", "piqp", form="primal", tolerance=1.0)
+    assert (abs(answer.gap - exact.gap) <= answer.gap_error_mm).all()
