@@ -119,6 +119,6 @@ def _factory(name: str, plugin: Path | None) -> Callable[..., Solver]:
 def _class_of(name: str) -> type[Solver]:
     try:
         module = importlib.import_module(modules()[name])
-    except ImportError as error:
+    except (ImportError, AttributeError) as error:  # another version may lack what an adapter names
         raise InputError.one("solvers", "name", name, f"cannot be imported here ({error})") from error
     return solver_class(module, Path(str(module.__file__)))

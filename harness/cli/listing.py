@@ -27,10 +27,10 @@ def _solvers() -> Iterator[Sequence[str]]:
     yield "solver", "forms", "version", "through"
     for name in solver_names():
         try:
-            forms = " ".join(make_solver(name, {}).forms)
+            forms, version = " ".join(make_solver(name, {}).forms), solver_version(name)
         except InputError as error:
-            forms = error.faults[0].allowed
-        yield name, forms, solver_version(name), "" if name in modules() else "qpsolvers"
+            forms, version = error.faults[0].allowed, "unknown"
+        yield name, forms, version, "" if name in modules() else "qpsolvers"
 
 
 def _scenes() -> Iterator[Sequence[str]]:

@@ -1,8 +1,10 @@
 """Solvers by name, their options, and a user's own solver from a file."""
 
 import doctest
+import importlib
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,6 +12,7 @@ from refusals import refusal_of
 from solver_forms import TESTED
 
 import solvers.base
+from harness.cli.listing import listing
 from problems.errors import InputError
 from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
@@ -67,6 +70,22 @@ def test_bad_names_and_options_are_input_errors(name: str, options: dict[str, An
     assert len(error.faults) == max(1, len(options))
     for word in words:
         assert word in str(error)
+
+
+@pytest.mark.parametrize("error", [ImportError("no libosqp.so"), AttributeError("no attribute 'OSQP'")])
+def test_a_library_that_cannot_be_imported_is_a_line_of_the_list(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a version that lacks what its adapter names; the others are listed as ever."""
+
+    def failing(module: str) -> Any:
+        if module.endswith(".osqp"):
+            raise error
+        return importlib.import_module(module)
+
+    monkeypatch.setattr("solvers.registry.importlib", SimpleNamespace(import_module=failing))
+    names, forms = (list(column.cells) for column in listing("solvers").columns[:2])
+    assert dict(zip(names, forms, strict=True))["osqp"] == f"cannot be imported here ({error})"
 
 
 def test_the_example_of_the_interface_runs() -> None:
