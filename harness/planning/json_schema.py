@@ -35,10 +35,12 @@ def schema_of(kind: Literal["scene", "suite", "row"]) -> dict[str, Any]:
     schema = {"$schema": DIALECT, **model.model_json_schema(), "additionalProperties": False}
     if kind == "suite":
         schema["required"].remove("name")  # by default the file's
-    for effect in (effect for effect in effects.values() if effect.columns):
-        table, in_file = schema["$defs"][effect.__name__], ("points", *effect.more_columns)
-        table["properties"] |= FILE
-        table["required"] = [key for key in table["required"] if key not in in_file]
+    for table in schema.get("$defs", {}).values():  # by kind: its class may have the name of another model
+        effect = effects.get(table.get("properties", {}).get("kind", {}).get("const"))
+        if effect and effect.columns:
+            in_file = ("points", *effect.more_columns)
+            table["properties"] |= FILE
+            table["required"] = [key for key in table["required"] if key not in in_file]
     return schema
 
 

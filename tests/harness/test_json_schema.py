@@ -12,6 +12,8 @@ from published_runs import DIRECTORIES
 from harness.planning.json_schema import FILE, schema_of
 from harness.planning.suite import SUITES, suite_names
 from harness.results import records
+from problems.effects.fasteners import Fasteners
+from problems.effects.installed_fasteners import InstalledFasteners
 from problems.model.effect_tables import FILE_KEYS, effect_class, effect_kinds
 from problems.scene_files import KEYS, SCENES, scene_names
 
@@ -42,6 +44,17 @@ def test_every_scene_and_suite_of_the_package_is_valid() -> None:
         assert faults(SCENE, tomllib.loads(path.read_text("utf-8"))) == [], path
     for path in [*(SUITES / f"{name}.toml" for name in suite_names())]:
         assert faults(SUITE, tomllib.loads(path.read_text("utf-8"))) == [], path
+
+
+def test_an_effect_may_have_the_name_of_another_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stage(InstalledFasteners):
+        """One of the user's own."""
+
+    module = "harness.planning.json_schema"
+    monkeypatch.setattr(f"{module}.effect_kinds", lambda: ["fasteners", "stage"])
+    monkeypatch.setattr(f"{module}.effect_class", {"stage": Stage, "fasteners": Fasteners}.get)
+    table = {"joint": JOINT, "effect": [{"kind": "stage", "file": "holes.csv"}], "stage": [{"name": "1"}]}
+    assert faults(jsonschema.Draft202012Validator(schema_of("scene")), table) == []
 
 
 def test_every_published_row_is_valid() -> None:
