@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import repeat
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import scipy.sparse as sp
@@ -143,6 +144,8 @@ class LiveAnswer:
         stages.
     starts : tuple of DualStart
         Each problem that was solved on the way: those of the next answer start from them.
+    explorer : str
+        The key of the `Explorer` that gave it: another one has other matrices.
     """
 
     settings: Settings
@@ -153,6 +156,7 @@ class LiveAnswer:
     stage: str = ""
     stages: tuple["LiveAnswer", ...] = ()
     starts: tuple[DualStart, ...] = ()
+    explorer: str = ""
 
 
 class Explorer:
@@ -183,7 +187,7 @@ class Explorer:
     @in_turn
     def __init__(self, scene: Source, form: Form | None = None) -> None:
         joint_scene = load_scene(scene)
-        self.settings = Settings.of(joint_scene)
+        self.settings, self.key = Settings.of(joint_scene), uuid4().hex
         assert isinstance(joint_scene, JointScene)
         self.scene, self.form = joint_scene, form or chosen_form(joint_scene, FORMS, None).form
         self.sessions: list[_Session] = []  # of each problem that `through` solves, in its order
@@ -215,7 +219,7 @@ class Explorer:
         Raises
         ------
         InputError
-            If a setting is wrong.
+            If a setting is wrong, or `near` is of another Explorer.
         """
         return self._through(settings, near, proven=False)
 
@@ -236,6 +240,8 @@ class Explorer:
         return self._through(answer.settings, answer, proven=True)
 
     def _through(self, settings: Settings, near: LiveAnswer | None, proven: bool) -> LiveAnswer:
+        if near and near.explorer != self.key:
+            raise InputError.one("Explorer", "answer", "of another Explorer", "one of this")
         scene = replace(self.scene, effects=settings.applied(self.scene))
         sessions, starts = iter(self.sessions), list[DualStart]()
         earlier = iter(near.starts) if near and near.starts else repeat(None)
@@ -253,7 +259,7 @@ class Explorer:
             elif scene.stages:  # else nothing is locked
                 x = session.data.assembly.K.solve(load.f - session.data.assembly.A @ lam)
             starts.append(DualStart(load, lam, gap))
-            answer = LiveAnswer(settings, load, lam, gap, error)
+            answer = LiveAnswer(settings, load, lam, gap, error, explorer=self.key)
 
             def elongations(T: sp.csc_array) -> Matrix:
                 nonlocal locks_mm

@@ -1,6 +1,7 @@
 """Answers while fasteners move, against `solve` on the scene as it is saved; wrong values; words."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from queue import Queue
 from threading import Event
@@ -163,6 +164,16 @@ def test_stages_set_one_table_of_fasteners_that_move(
     scene.write_text(text.replace("on = ['tacks']", "on = []") if "csv" in new else text)
     with pytest.raises(InputError, match=said):
         Explorer(scene_at(scene), "dual")
+
+
+def test_an_answer_of_another_explorer_is_refused(path: Path, tmp_path: Path) -> None:
+    """Its overlap is that of other matrices."""
+    (tmp_path / "thicker.toml").write_text(path.read_text().replace("thickness = 2.0", "thickness = 4.0"))
+    explorers = [Explorer(scene_at(file), "dual") for file in (path, tmp_path / "thicker.toml")]
+    settings, (one, other) = explorers[0].settings, explorers
+    for refused in (partial(one.answer, settings), one.proven):
+        with pytest.raises(InputError, match="of another Explorer"):
+            refused(other.answer(settings))
 
 
 def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
