@@ -8,7 +8,6 @@ proven right after. If the settings on the page are wrong, the last answer stays
 
 import secrets
 import shlex
-import tomllib
 from collections.abc import Callable
 from html import escape
 from pathlib import Path
@@ -27,12 +26,12 @@ from bokeh.server.server import Server
 from harness.explore.live_answers import CHANGED, Explorer, LiveAnswer, Settings
 from harness.explore.raster import Raster
 from harness.results.records import replace_text
-from harness.scene.scene_file import edited
+from harness.scene.scene_file import edited, refuse_unreadable
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
-from problems.scene_files import read_scene, scene_of
+from problems.scene_files import read_scene
 from report.document.numbers import counted, digits_beside, position, upwards
 from report.document.verdict_colours import FAIL, PASS
 
@@ -205,7 +204,7 @@ class Page:
                 allowed = "has changed since it was read: start explore again"
                 raise InputError.one("page", "scene", self.source, allowed)
             text = edited(self.source, path.parent, self.settings.write_to, CHANGED)
-            scene_of(tomllib.loads(text), str(path))  # refused now, in the words of `solve`
+            refuse_unreadable(text, path)  # now, in the words of `validate`
             replace_text(path, text)
         except (InputError, OSError) as error:
             faults = error.faults if isinstance(error, InputError) else [error]

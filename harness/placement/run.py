@@ -4,7 +4,6 @@ The plan found and the scene's own plan are then solved as series of load cases,
 DIRECTORY/own, on the scenes as a user would read them.
 """
 
-import tomllib
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +23,7 @@ from harness.results import records
 from harness.results.atomic_output import refuse_changed, refuse_inputs
 from harness.results.provenance import fingerprints
 from harness.scene.allowed_gap import refuse_unusable
-from harness.scene.scene_file import MOVED, edited, file_of, opened, with_fasteners
+from harness.scene.scene_file import MOVED, edited, file_of, opened, refuse_unreadable, with_fasteners
 from harness.scene.solution import Source, load_scene
 from harness.series.load_case_source import DEFAULT, GapCases
 from harness.series.run import run as run_series
@@ -42,7 +41,7 @@ from problems.load_cases.random_inputs import RandomInputs
 from problems.load_cases.scan_modes import ScanModes
 from problems.model.scene import JointScene, Scene
 from problems.reporter import SILENT, Reporter
-from problems.scene_files import read_scene, scene_of
+from problems.scene_files import read_scene
 
 RECORD = "place.json"
 SERIES = ("own", "plan")
@@ -173,7 +172,7 @@ def place(
         reporter.say(HELD_BACK)
     console = console_of(reporter)
     with records.locked(directory, records.PLANS, outputs=(*OUTPUTS, *SERIES, "report")):
-        scene_of(tomllib.loads(current), str(directory / "own.toml"))  # as is refused at the end
+        refuse_unreadable(current, directory / "own.toml")  # as is refused at the end
         nodes = prepared(study.bare, form=form).assembly.contact_nodes
         assert nodes is not None  # of a joint
         pool = workers(scheduler, console) if scheduler else nullcontext()

@@ -1,6 +1,7 @@
 """Writes a scene's file with other values for another folder; its comments and order are kept."""
 
 import os
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -12,9 +13,9 @@ from problems.errors import InputError
 from problems.input.bounded_types import resolved
 from problems.input.text_files import read_text
 from problems.load_cases.random_gaps import RandomGaps
-from problems.model.scene import Scene
+from problems.model.scene import JointScene, Scene
 from problems.random_scenes import drawn_table
-from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_scene, read_toml
+from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_scene, read_toml, scene_of
 
 MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes", "stress", "stress_points")  # may be relative paths
@@ -62,6 +63,20 @@ def edited(
             if isinstance(value := inner.get(key), str) and (home / value).is_file():
                 inner[key] = relative(home / value, folder)
     return tomlkit.dumps(document)
+
+
+def refuse_unreadable(text: str, path: Path) -> None:
+    """Raise InputError, as `validate` does, for the text of a scene that is to be written to a path."""
+    refuse_wrong_laws(scene_of(tomllib.loads(text), str(path)))
+
+
+def refuse_wrong_laws(scene: Scene) -> None:
+    """Raise InputError for what is wrong in the table [random] of a scene."""
+    if isinstance(scene, JointScene) and scene.random:
+        from problems.load_cases.random_inputs import inputs_of  # only what a scene calls for
+
+        if faults := inputs_of(scene, scene.random, stiffness=True)[1]:
+            raise InputError(faults)
 
 
 def relative(file: Path, folder: Path) -> str:

@@ -14,7 +14,6 @@ from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import estimated_displacements, expected_error
 from problems.build import prepared, same_stiffness
-from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
@@ -26,6 +25,7 @@ from problems.model.stage_answers import last_scene, stage_scenes
 from problems.reporter import SILENT, Reporter
 from report.document.numbers import counted
 
+from .scene_file import refuse_wrong_laws
 from .solution import Source, load_scene
 
 
@@ -62,11 +62,7 @@ def validate(scene: Source, *, reporter: Reporter = SILENT) -> Size | None:
         from .stress import refuse_unusable  # only what a scene calls for
 
         refuse_unusable(None, read)
-    if isinstance(read, JointScene) and read.random:
-        from problems.load_cases.random_inputs import inputs_of
-
-        if faults := inputs_of(read, read.random, stiffness=True)[1]:
-            raise InputError(faults)
+    refuse_wrong_laws(read)
     if isinstance(read, JointScene) and isinstance(read.joint, Joint):
         assert size is not None
         _plates(read, read.joint, size, console)

@@ -1,6 +1,5 @@
 """Searches for shims and writes them: as a scene, a table and a drawing, and as a report."""
 
-import tomllib
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from math import inf
@@ -16,7 +15,7 @@ from harness.placement.session import PlanSession
 from harness.results import records
 from harness.results.atomic_output import refuse_inputs, refuse_unwritable
 from harness.results.provenance import fingerprints, stamp
-from harness.scene.scene_file import add_effect, edited, file_of, opened
+from harness.scene.scene_file import add_effect, edited, file_of, opened, refuse_unreadable
 from harness.scene.solution import Source, load_scene
 from harness.scene.stress import none_told, refuse_unusable
 from harness.series.load_case_source import DEFAULT, GapCases
@@ -32,7 +31,6 @@ from problems.model.positions import Positions
 from problems.model.scene import JointScene
 from problems.model.stage_answers import last_scene
 from problems.reporter import SILENT, Reporter
-from problems.scene_files import scene_of
 from problems.storage import digest
 
 from .gap_regions import patches_of_gap
@@ -211,7 +209,7 @@ def shim(
         reporter.say(HELD_BACK)
     with records.locked(directory, records.SHIMS, outputs=OUTPUTS):
         if not each:
-            scene_of(tomllib.loads(with_one), str(directory / "shimmed.toml"))  # as is refused at the end
+            refuse_unreadable(with_one, directory / "shimmed.toml")  # as is refused at the end
         pool = workers(scheduler, console_of(reporter)) if scheduler else nullcontext()
         with pool as executor, reporter.step("search"):
             journal = AnswerJournal(study, directory / records.SHIMS, identity, executor)

@@ -299,6 +299,15 @@ def test_a_file_that_has_changed_is_not_saved_with_the_answer_to_the_old_one(
     assert moved.read_text().endswith("# noted\n")
 
 
+def test_laws_of_tables_that_become_one_are_not_saved(path: Path, tmp_path: Path) -> None:
+    law = '[random]\n"fasteners.0.preload" = "normal(40, 1)"\n'
+    page = page_of(tmp_path / "scene.toml", path.read_text() + ANOTHER + law)
+    page.path.value = str(tmp_path / "moved.toml")
+    page.save()
+    assert "[random]: key = &#x27;fasteners.0.preload&#x27;: one of" in page.fault.text
+    assert not (tmp_path / "moved.toml").exists()
+
+
 def test_a_scene_written_through_links_finds_its_files(tmp_path: Path) -> None:
     """From a linked folder to another, as on clusters; a file that is a link itself keeps its name.
 

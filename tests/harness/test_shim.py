@@ -46,6 +46,7 @@ from report.writers import shim_report
 pytestmark = pytest.mark.usefixtures("without_pictures")
 RIVET = '[[effect]]\nkind = "installed_fasteners"\npoints = [[90.0, 20.0]]\n'
 SHEET = '[[effect]]\nkind = "shims"\nthickness = 0.02\nx = [50.0, 100.0]\ny = [0.0, 50.0]\n'
+LAW = '[random]\nshims.thickness = "uniform(0.01, 0.01)"\n'
 STOCK = (0.02, 0.04, 0.08)
 ASKED = ("--allow-gap", 0.08, "--stock", "0.02,0.04,0.08", "--patches", "4x1")
 
@@ -207,6 +208,11 @@ def test_patches_of_a_gap_need_shims_that_change_nothing_else(strip: Path) -> No
         (FASTENERS + RIVET, "", ["no fasteners"]),
         (RIVET, RIVET + SHEET, ["--patches: 1, outline", "both fill the contact at 50, 0 mm"]),
         ('"initial_gap"', '"initial_gap"\nname = "shims"', ["another name: that of a kind"]),
+        (
+            RIVET,
+            RIVET + SHEET.replace("50.0, 100.0", "10.0, 40.0") + LAW,
+            ["[random]: key = 'shims.thickness'"],
+        ),
     ],
 )
 def test_a_scene_that_shims_do_not_fit_is_refused_before_the_search(
