@@ -217,7 +217,7 @@ def _written_scene(
     assert isinstance(scene, JointScene)
     if law is not None and law.points is not None:  # a scene has a scan, or random gaps around it
         others = without_fasteners(study.scene).effects
-        scene = replace(scene, effects=(*others, *scene.effects_of(Fasteners)))
+        scene = replace(scene, effects=(*others, *scene.effects_of(Fasteners)), random=study.scene.random)
     cases = source.of_search(scene, study.form)
     if result.samples and isinstance(cases, RandomGaps | RandomInputs | ScanModes):
         cases = replace(cases, count=result.samples[-1].numbers[-1] + 1)

@@ -306,8 +306,13 @@ def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: P
     scan.write_text("X,Y,Z\n0,0,0.03\n200,0,0.05\n9,9,9999\n0,50,0.06\n200,50,0.04\n")
     holes.write_text("name,X,Y\n" + "".join(f"H{x},{x},25\n" for x in range(20, 200, 40)))
     read_by = ("--columns", "X,Y,Z", "--missing", 9999, "--candidates", holes)
-    done = place(strip, tmp_path / "a", "--count", 2, "--around", scan, *read_by)
+    (varied := tmp_path / "varied.toml").write_text(
+        strip.read_text() + '[random]\ninitial_gap.mean = "normal(0.05, 0.01)"\n'
+    )
+    done = place(varied, tmp_path / "a", "--count", 2, "--around", scan, *read_by)
     assert done.exit_code == 0, done.output
+    for name in ("own", "plan"):  # of the same cases
+        assert all("initial_gap.mean" in row for row in series_file.rows(tmp_path / "a" / name))
     for table, x in (("plan.csv", "x"), ("report/order.csv", "x_mm")):
         lines = pd.read_csv(tmp_path / "a" / table).dropna()
         assert list(lines["name"]) == [f"H{at:g}" for at in lines[x]]
