@@ -201,9 +201,10 @@ def tolerance(
     options = replace(options, threads=options.threads or threads_per_worker(scheduler))
     lock = records.locked(directory, TOLERANCE, outputs=OUTPUTS)
     with lock, shared(scheduler, console_of(reporter)) as address:
-        if (directory / TOLERANCE).exists():
-            earlier = str(records.read_object(directory / TOLERANCE).get("find")).partition("=")[0].strip()
-            records.refuse_other(directory / TOLERANCE, {"key": earlier}, {"key": name})
+        if not (path := directory / TOLERANCE).exists():
+            records.replace_object(path, {"find": find})  # of an interrupted search, too
+        earlier = str(records.read_object(path).get("find")).partition("=")[0].strip()
+        records.refuse_other(path, {"key": earlier}, {"key": name})
         first, last = (bounds(value, None)[1] for value in (values[0], values[-1]))
         if np.array_equal(first, last, equal_nan=True) and np.isfinite(first).any():
             raise InputError.one("--find", "key", name, "one that changes gaps, and no option in its place")
@@ -229,7 +230,7 @@ def tolerance(
             said.insert(1, f"Without an answer, and not counted as kept: {without} over all values.")
         outcome = replace(outcome, sentences=tuple(said))
         asked = {"find": find, "allowed_mm": allow_gap_mm, "share": share, "cases": count}
-        records.replace_object(directory / TOLERANCE, asked | asdict(outcome))
+        records.replace_object(path, asked | asdict(outcome))
         from report.writers.tolerance_report import write  # slow to import: not before the first row
 
         write(directory, f"{name} in {read.name}", share, said, shares)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from io import StringIO
 from math import inf
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -147,12 +148,15 @@ def test_a_range_is_checked_before_its_first_end_is_solved(tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
-def test_a_directory_holds_the_series_of_one_key(tmp_path: Path) -> None:
-    (tmp_path / "tolerance.json").write_text(json.dumps({"find": f"{FORCE} = 1:600"}))
-    told = refusal_of(tolerance, write_strip(tmp_path), tmp_path, f"{SD}=0.1:0.2", LIMIT)
-    assert [(fault.where, fault.key, fault.value) for fault in told.faults] == [
-        (str(tmp_path / "tolerance.json"), "key", FORCE)
-    ]
+def test_a_directory_holds_the_series_of_one_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From its first series on."""
+    path, out = write_strip(tmp_path), tmp_path / "out"
+    monkeypatch.setattr(limit_search, "run_series", Mock(side_effect=MemoryError))
+    with pytest.raises(MemoryError):
+        tolerance(path, out, f"{FORCE} = 1:600", LIMIT)
+    told = refusal_of(tolerance, path, out, f"{SD}=0.1:0.2", LIMIT)
+    expected = [(str(out / "tolerance.json"), "key", FORCE)]
+    assert [(fault.where, fault.key, fault.value) for fault in told.faults] == expected
 
 
 #: The figures of a case, by the value, whether the cases are fresh, and its number.
