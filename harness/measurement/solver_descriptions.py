@@ -203,15 +203,16 @@ def set_aside(directory: Path, valid: list[Row], old: list[Row], console: Consol
         records.append(directory / records.OUTDATED, *(row | {"answer": None, "log": None} for row in old))
         records.rewrite(directory / records.MEASUREMENTS, valid)
         aside = f"Set aside in {records.OUTDATED}: {counted(len(old), 'row')}"
-        why = "because the scene, the solver or the limits have changed since, or a process was killed"
+        why = "because the scene, the solver or the limits have changed since, or a failure may have passed"
         console.print(f"{aside}, {why}.", style="yellow")
 
 
 def outdated(row: Row, m: Measurement, solver: Description) -> bool:
     """Whether a row of a scene as it is has to be measured again.
 
-    It is of another series, solver or accuracy, hit a limit that is wider now, was killed, or has the status
-    `not_run` of older versions; or a search tried what is asked for now: reports keep one row of a search.
+    It is of another series, solver or accuracy, hit a limit that is wider now, failed by a cause that may be
+    over, or has the status `not_run` of older versions; or a search tried what is asked for now: reports keep
+    one row of a search.
     """
     current = {
         "solver_version": solver.version,
@@ -225,5 +226,5 @@ def outdated(row: Row, m: Measurement, solver: Description) -> bool:
     out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.suite.memory_limit_mib
     tried = bool(row.get("searched")) and not m.searched
-    tried_again = row["status"] == "not_run" or records.was_killed(row)
+    tried_again = row["status"] == "not_run" or records.may_pass(row)
     return changed or tried or out_of_time or out_of_memory or tried_again

@@ -27,6 +27,7 @@ MEASUREMENTS, PLANS, SHIMS, TOLERANCE = "measurements.jsonl", "plans.jsonl", "sh
 #: The file by which each command continues an interrupted run; a directory has one of them at most.
 JOURNALS = (MEASUREMENTS, SERIES, PLANS, SHIMS, TOLERANCE)
 OUTDATED = "measurements.outdated.jsonl"
+PASSING = {"crashed": "SIGKILL", "failed": "took more than"}
 ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read
 OTHER = "name another directory with --out"
 
@@ -56,9 +57,12 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def was_killed(row: Row) -> bool:
-    """Whether SIGKILL ended the solver's process, as where memory ran out: a further run tries again."""
-    return row.get("status") == "crashed" and "SIGKILL" in (row.get("message") or "")
+def may_pass(row: Row) -> bool:
+    """Whether the cause of a failure may be over, so that a further run tries again: SIGKILL ended the
+    process, as where memory ran out, or opening or judging took too long.
+    """
+    status = row.get("status") or ""
+    return status in PASSING and PASSING[status] in (row.get("message") or "")
 
 
 def append(path: Path, *rows: Row) -> None:

@@ -161,10 +161,10 @@ def states(directory: Path, job: Job) -> NDArray[np.int8]:
 
 
 def is_open(row: Row, job: Job) -> bool:
-    """Whether a case without an answer is tried again: its limit is wider now, or memory ran out."""
+    """Whether a case without an answer is tried again: its limit is wider now, or its cause may be over."""
     if limit := LIMITS.get(row.get("status") or ""):
         return bool(row.get(limit, 0) < getattr(job, limit))  # without one, the system had no more memory
-    return records.was_killed(row)
+    return records.may_pass(row)
 
 
 def summary(rows: Iterable[Row], cases: int, console: Console) -> int:

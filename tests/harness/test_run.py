@@ -147,7 +147,7 @@ def test_a_row_whose_process_was_killed_is_measured_again(copy: Path, folder: Pa
     rows[3] |= {"status": "crashed", "message": "killed by SIGSEGV"}
     records.rewrite(copy / records.MEASUREMENTS, rows)
     _, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
-    assert "1 row, because the scene, the solver or the limits have changed since, or a process was" in text
+    assert "1 row, because the scene, the solver or the limits have changed since, or a failure" in text
     assert [row["status"] for row in rows_of(copy)[2:]] == ["crashed", "solved"]
 
 
