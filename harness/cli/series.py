@@ -92,7 +92,7 @@ def series(
         accuracy, limits = (tolerance, limit, check), (time_limit, memory_limit)
         cases = replace(source(), contributors=contributors)
         settings = SeriesOptions(solver, form, *accuracy, threads, plugin, *limits)
-        if find or share is not None or resolution is not None:
+        if find is not None or share is not None or resolution is not None:
             if sweep or not find or allow_gap is None:
                 raise InputError.one("--find", "KEY=LOW:HIGH", find, "with --allow-gap, without --sweep")
             goal, told = (allow_gap, share, resolution), ConsoleReporter(console, plain=True)

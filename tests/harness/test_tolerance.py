@@ -133,6 +133,7 @@ def test_a_key_may_change_the_stiffness(tmp_path: Path) -> None:
         (("--find", f"{SD}=0.1:0.4", "--resolution", 2), "a resolution from"),
         (("--find", f"{SD}=0.1:0.4", "--sweep", "initial_gap.mean=1,2"), "without --sweep"),
         (("--share", 0.5), "KEY=LOW:HIGH"),
+        (("--find", ""), "KEY=LOW:HIGH"),
         (("--find", f"{FORCE}=-1:5"), "must be greater than 0"),
     ],
 )
