@@ -56,7 +56,7 @@ class Goal:
         the share.
         """
         if self.share < 1 and self.share**cases > ALPHA:
-            allowed = f"{cases} cases cannot show it: take {self.least(ALPHA)}, or a share of 1"
+            allowed = f"{counted(cases, 'case')} cannot show it: take {self.least(ALPHA)}, or a share of 1"
             raise InputError.one("--share", "share", self.share, allowed)
         return floor((1 - self.share) * cases / 2 + 1e-9)
 
