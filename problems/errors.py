@@ -3,7 +3,8 @@
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Self, TypeVar
+from numbers import Integral
+from typing import Any, Self, TypeVar
 
 CONTROL = re.compile("[\0-\x1f\x7f]")
 In = TypeVar("In")
@@ -74,6 +75,16 @@ def refuse_text(where: str, **lists: object) -> None:
     allowed = "a list of texts, not one text"
     if faults := [Fault(where, name, text, allowed) for name, text in lists.items() if isinstance(text, str)]:
         raise InputError(faults)
+
+
+def number_faults(**numbers: tuple[Any, ...]) -> list[Fault]:
+    """A fault for each option that is given and no whole number: its value, the least, perhaps the most."""
+    return [
+        Fault(f"--{name}", name, value, f"a whole number, at least {', at most '.join(map(str, limits))}")
+        for name, (value, *limits) in numbers.items()
+        if value is not None
+        and not (isinstance(value, Integral) and limits[0] <= value <= max(limits[1:], default=value))
+    ]
 
 
 def read_all(read: Callable[[In], Out], inputs: Iterable[In]) -> list[Out]:

@@ -23,7 +23,7 @@ from harness.series.session import Job, SeriesOptions, is_rung
 from harness.solving.call_lock import keeps_threads
 from harness.terminal import DONE
 from harness.terminal.console import console_of
-from problems.errors import Fault, InputError, refuse_text
+from problems.errors import Fault, InputError, number_faults, refuse_text
 from problems.load_cases import LoadCases
 from problems.load_cases.sweep import sweep as swept
 from problems.model.scene import ManufacturedScene
@@ -126,6 +126,7 @@ def run_series(
     if sweep and cases.count is not None:
         faults.append(Fault("--cases", "cases", cases.count, "a sweep has one per combination of values"))
     faults += unused(options.plugin, [solver])
+    faults += number_faults(threads=(options.threads, 1), check=(options.check, 0))
     if options.plugin and isinstance(read, ManufacturedScene) and not is_rung(read):
         allowed = "a scene that another process can read, by its name or from a file: `export` makes one"
         faults.append(Fault("--plugin", "scene", read.name, allowed))

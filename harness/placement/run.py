@@ -33,7 +33,7 @@ from harness.terminal.console import console_of
 from problems.build import prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, number_faults
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
@@ -140,8 +140,7 @@ def place(
     faults = cases.faults(table=candidates is not None and Path(candidates).is_file())
     if allow_gap_mm is None and count is None:
         faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
-    if count is not None and not 0 < count <= len(holes):
-        faults.append(Fault("--count", "N", count, f"at most {len(holes)}, the candidates"))
+    faults += number_faults(count=(count, 1, len(holes)))  # of the candidates
     if share is not None and not 0 < share <= 1:
         faults.append(Fault("--share", "share", share, "above 0, at most 1"))
     moving = [law for law in cases.laws(movable.scene) if law.strip().startswith("fasteners.")]

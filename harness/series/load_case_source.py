@@ -8,14 +8,15 @@ from pathlib import Path
 
 from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
-from problems.errors import Fault, InputError, refuse_text
+from problems.errors import Fault, InputError, number_faults, refuse_text
 from problems.forms import Form
 from problems.input.tables import AS_NAMED, TableOptions
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
-from problems.load_cases.random_gaps import number_faults, random_gaps
+from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.random_inputs import random_inputs
 from problems.load_cases.scan_modes import VARIANCE, scan_modes
+from problems.load_cases.sweep import MOST_CASES
 from problems.model.scene import JointScene, Scene
 from problems.model.stage_answers import last_scene
 
@@ -97,7 +98,10 @@ class GapCases:
         random = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
         random += ["--random"] * bool(self.random)
         files = ["--scans"] * bool(self.scans), ["--gaps"] * bool(self.gaps)
-        sources, faults = (*files, ["--sweep"] * bool(sweep), random), number_faults(self.count, self.seed)
+        sources, points = (*files, ["--sweep"] * bool(sweep), random), (self.contributors, 1)
+        faults = number_faults(cases=(self.count, 1, MOST_CASES), seed=(self.seed, 0), contributors=points)
+        empty = (name for name in ("gaps", "scans") if getattr(self, name) == "")
+        faults += [Fault(f"--{name}", "file", "", "the path of one: an empty text is none") for name in empty]
         if self.variance is not None and not (self.scans and 0 < self.variance <= 1):
             faults.append(Fault("--variance", "share", self.variance, "above 0, at most 1, with --scans"))
         if self.options.columns and not (self.around or self.scans or table):

@@ -1,7 +1,6 @@
 """Load cases that differ in a random initial gap."""
 
 from dataclasses import dataclass, replace
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from pydantic import ValidationError
 from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
-from problems.errors import Fault, InputError, refuse_text
+from problems.errors import Fault, InputError, number_faults, refuse_text
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded_types import validation_faults
@@ -23,6 +22,7 @@ from problems.storage import digest
 
 from . import LoadCases
 from .gaps_through_scan import Scan, read_scan
+from .sweep import MOST_CASES
 
 #: The bits of a case's seed: integers of this size are exact in every JSON reader.
 SEED_BITS = 53
@@ -89,15 +89,6 @@ class RandomGaps(LoadCases):
             return None
         assert self.field.random is not None
         return Scan.of(self.joint, self.points, self.field.random.correlation_length)
-
-
-def number_faults(cases: int | None, seed: int | None) -> list[Fault]:
-    """A fault for a number of cases below 1, and for a seed below 0."""
-    return [
-        Fault(f"--{name}", name, value, f"a whole number, at least {least}")
-        for name, value, least in (("cases", cases, 1), ("seed", seed, 0))
-        if value is not None and not (isinstance(value, Integral) and value >= least)
-    ]
 
 
 def random_gaps(
@@ -173,7 +164,8 @@ def random_gaps(
         usual = 0.0
     values = {"mean": table.get("mean", usual)} | (table.get("random") or {})
     values |= {key: value for key, value in law.items() if value is not None}
-    allowed, faults = "is not in the scene: give --{}, in mm", number_faults(cases, seed)
+    faults = number_faults(cases=(cases, 1, MOST_CASES), seed=(seed, 0))
+    allowed = "is not in the scene: give --{}, in mm"
     missing = [key for key in law if values.get(key) is None]
     faults += [Fault(where, key, None, allowed.format(key.replace("_", "-"))) for key in missing]
     if faults:

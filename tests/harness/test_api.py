@@ -92,9 +92,18 @@ def test_load_cases_have_paths_or_texts_and_possible_numbers(tmp_path: Path) -> 
         assert len({tuple(map(str, cases.files)) for cases in pair}) == 1
         text, path_of = (cases.of(scene, "dual").load(1).g for cases in pair)
         np.testing.assert_array_equal(text, path_of)
-    for wrong in (GapCases(count=0, seed=-1), GapCases(count=2.5, seed=0.5)):  # type: ignore[arg-type]
-        faults = refusal_of(harness.run_series, scene, tmp_path / "none", wrong).faults
-        assert [fault.where for fault in faults] == ["--cases", "--seed"]
+    how: Any = {"threads": 2.5, "check": -1}
+    for given, names in (
+        ({"count": 0, "seed": -1}, ["--cases", "--seed"]),
+        ({"count": 2.5, "seed": 0.5}, ["--cases", "--seed"]),
+        ({"count": 10**10, "gaps": ""}, ["--cases", "--gaps"]),
+        ({"contributors": 8.0, "random": ("x",), "scans": ""}, ["--contributors", "--scans"]),
+    ):
+        asked: Any = GapCases(**given), harness.SeriesOptions(**how)  # type: ignore[arg-type]
+        faults = refusal_of(harness.run_series, scene, tmp_path / "none", *asked).faults
+        assert [fault.where for fault in faults] == [*names, "--threads", "--check"]
+    faults = refusal_of(harness.place, scene, tmp_path / "none", count=2.5).faults
+    assert [fault.where for fault in faults] == ["--count"]
     pair = [GapCases(2, 3), GapCases(np.int64(2), np.int64(3))]  # type: ignore[arg-type]
     assert len({cases.of(scene, "dual").key for cases in pair}) == 1
 
