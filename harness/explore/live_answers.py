@@ -82,14 +82,14 @@ class Settings:
         own = Settings.of(scene)
         both = ("means", self.means, own.means), ("pressures", self.pressures, own.pressures)
         for name, given, there in both:
-            if len(given) != len(there):
+            if np.shape(given) != (len(there),):
                 raise InputError.one(PAGE, name, given, f"as many as in the scene, {len(there)}")
         means, pressures, faults, made = iter(self.means), iter(self.pressures), list[Fault](), list[Effect]()
         fasteners = False
         for effect in scene.effects:
             changes: dict[str, Any] = {}
             if isinstance(effect, Fasteners):
-                if fasteners or not self.places:
+                if fasteners or not len(self.places):
                     continue
                 fasteners, changes = True, {"points": self.places, "pattern": None, "preload": self.preload}
             elif isinstance(effect, InitialGap):
@@ -189,7 +189,7 @@ class Explorer:
         joint_scene = load_scene(scene)
         self.settings, self.key = Settings.of(joint_scene), uuid4().hex
         assert isinstance(joint_scene, JointScene)
-        self.scene, self.form = joint_scene, form or chosen_form(joint_scene, FORMS, None).form
+        self.scene, self.form = joint_scene, chosen_form(joint_scene, FORMS, form).form
         self.sessions: list[_Session] = []  # of each problem that `through` solves, in its order
         for _ in through(self.scene, self._opened):
             pass

@@ -167,13 +167,15 @@ def test_stages_set_one_table_of_fasteners_that_move(
 
 
 def test_an_answer_of_another_explorer_is_refused(path: Path, tmp_path: Path) -> None:
-    """Its overlap is that of other matrices."""
+    """Its overlap is that of other matrices. So is an unknown form."""
     (tmp_path / "thicker.toml").write_text(path.read_text().replace("thickness = 2.0", "thickness = 4.0"))
     explorers = [Explorer(scene_at(file), "dual") for file in (path, tmp_path / "thicker.toml")]
     settings, (one, other) = explorers[0].settings, explorers
     for refused in (partial(one.answer, settings), one.proven):
         with pytest.raises(InputError, match="of another Explorer"):
             refused(other.answer(settings))
+    with pytest.raises(InputError, match="--form: form = 'full'"):
+        Explorer(scene_at(path), "full")  # type: ignore[arg-type]
 
 
 def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
@@ -206,6 +208,8 @@ def test_what_is_in_the_file_of_the_assembly_cannot_be_saved_changed(tmp_path: P
         ({"places": ((500.0, 10.0),)}, ["fasteners.points[0]", "[500.0, 10.0]", "on the junction"]),
         ({"preload": 0.0}, ["fasteners.preload", "0.0", "greater than 0"]),
         ({"means": ()}, ["page: means = (): as many as in the scene, 1"]),
+        ({"means": 0.3}, ["page: means = 0.3: as many as in the scene, 1"]),
+        ({"places": np.ones((2, 2))}, ["fasteners.points[1]", "separate places"]),
         (
             {"means": (float("nan"),), "preload": -1.0},
             ["initial_gap.mean", "nan", "fasteners.preload", "-1.0"],
