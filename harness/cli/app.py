@@ -63,7 +63,7 @@ def harness(version: Annotated[bool, Version] = False) -> None:
 
     \b
     Exit codes: 0 ok, 1 accuracy lost, 2 wrong usage or bad input, 3 nothing could be judged,
-                4 gap larger than allowed, 5 inputs that do not belong together, 130 interrupted.
+                4 gap or stress too large, 5 inputs that do not belong together, 130 interrupted.
     """
 
 

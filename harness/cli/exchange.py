@@ -89,7 +89,7 @@ def judge(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npz or .csv.")],
     scene: SceneName,
     form: Annotated[
-        FormName | None, option("FORM", "The form it was computed in: of sparse, x has all unknowns.")
+        FormName | None, option("FORM", "The form it was computed in: in sparse, x has all unknowns.")
     ] = None,
     limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
     reference_limit: ReferenceLimit = None,

@@ -20,8 +20,8 @@ def explore(
 
     Fasteners move, come and go; preload, pressures, the mean gap and the limit are sliders. The page says
     PASS or FAIL with the largest gap, its place and its proven error, after the last stage of the scene or
-    another one. A plan can be kept beside the next one, and saved as a scene that `solve` answers alike. It
-    is served to this machine only; Ctrl-C ends it.
+    another one. A plan can be kept beside the next one, and saved as a scene that `solve` answers alike. The
+    page is served to this machine only; Ctrl-C ends it.
 
     \b
     Examples:

@@ -33,7 +33,7 @@ def place(
     """Find the fewest fasteners that keep a gap limit in most load cases, or the best N, and their order.
 
     Fasteners of the scene's preload are chosen from candidate holes. The load cases are random or measured
-    gaps, as of `series`; a scene without random gaps is one case. The share of cases in which a plan keeps
+    gaps, as in `series`; a scene without random gaps is one case. The share of cases in which a plan keeps
     the gap comes from fresh cases, not from those of the search; every gap is proven. DIR has the plan as a
     scene (plan.toml) and a table (plan.csv), and a report with the gap against the number of fasteners. Stop
     with Ctrl-C, run the same command again, and it continues.

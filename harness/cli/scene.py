@@ -34,7 +34,7 @@ def solve(
     tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
     form: Annotated[
         options.FormName | None,
-        option("FORM", "primal, dual or sparse: without condensation.  [default: by size]"),
+        option("FORM", "primal, dual, or sparse (without condensation).  [default: by size]"),
     ] = None,
     reference_limit: options.ReferenceLimit = None,
     allow_gap: options.AllowGap = None,
@@ -49,11 +49,11 @@ def solve(
     that answer. If the parts do not meet, this is a linear solve. The error of the finite-element mesh is
     estimated from a coarser one.
 
-    The stages of a scene are solved in turn, and listed in a table; --allow-gap decides on the last one.
+    The stages of a scene are solved in turn, and listed in a table; --allow-gap judges the last one.
 
     Two scenes on one junction, such as two plans of fasteners, are solved into DIR/first and DIR/second and
-    compared: gaps side by side, a map of the difference, the force in each fastener. --allow-gap then decides
-    on the second. If their meshes differ, gaps are compared at the contacts of the coarser one, and the
+    compared: gaps side by side, a map of the difference, the force in each fastener. --allow-gap then judges
+    the second. If their meshes differ, gaps are compared at the contacts of the coarser one, and the
     command says whether the mesh changes the verdict.
 
     \b
@@ -65,9 +65,9 @@ def solve(
 
     \b
     Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input,
-                3 --allow-gap or --allow-stress cannot be told from what is proven,
+                3 what is proven does not decide about --allow-gap or --allow-stress,
                 4 a gap is larger than --allow-gap, or a stress than --allow-stress,
-                5 the two scenes are of other parts in contact, or another junction.
+                5 the two scenes differ in their junction, or in which parts are in contact.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.solve import solve_into

@@ -38,7 +38,7 @@ def shim(
 ) -> None:
     """Find the fewest shims from a stock, then the least volume, that keep a gap limit after fastening.
 
-    The load cases are random or measured gaps, as of `series`; a scene without random gaps is one case. For
+    The load cases are random or measured gaps, as in `series`; a scene without random gaps is one case. For
     many, one set of shims is found, and fresh cases say in what share of all it keeps the limits; each gap is
     proven. DIR has the scene with shims (shimmed.toml), their table and drawing (shims.csv, shims.png), and a
     report. Stop with Ctrl-C, run the same command again, and it continues.

@@ -69,8 +69,8 @@ def run(
     """Measure a suite and write rows, answers and report.
 
     Each measurement is a process of its own, stopped at its time or memory limit. Rows are saved as they are
-    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped. Until it is
-    complete, the directory takes no run that leaves out some of its measurements.
+    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped. Until all are
+    there, the directory takes no run that leaves out some of its measurements.
 
     --with measures versions of a library side by side. pip installs each once, into an environment in the
     cache that has all other packages from here. A version that cannot be installed, or that its adapter
@@ -158,7 +158,7 @@ def gate(
 
     From a search for a tolerance, the one that it keeps is judged; runs that a trace stopped are not.
 
-    In a job of GitHub's, the outcome is appended to the page of the job ($GITHUB_STEP_SUMMARY).
+    In a GitHub job, the outcome is appended to the page of the job ($GITHUB_STEP_SUMMARY).
 
     \b
     Examples:

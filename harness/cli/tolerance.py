@@ -32,8 +32,8 @@ def tolerance(
                                              --share 0.95 --out results/sd
 
     \b
-    Exit codes: 0 a value or the whole range keeps it, 2 wrong usage or bad input, 3 it cannot be judged, as
-                cases are unknown, 4 neither end of the range keeps it, or fresh cases contradict the value,
+    Exit codes: 0 a value or the whole range keeps it, 2 wrong usage or bad input, 3 undecided cases prevent a
+                verdict, 4 neither end of the range keeps it, or fresh cases contradict the value,
                 130 interrupted.
     """
     given: Any = {"check": 0, "scheduler": scheduler, "allow_gap": allow_gap}
