@@ -156,7 +156,7 @@ def run_series(
     alien = [*sweep, *([str(options.plugin)] if options.plugin else [])]
     if read.stages and alien:
         where = "--sweep, --plugin"
-        raise InputError.one(where, "given", ", ".join(alien), f"left out: {read.name} has stages")
+        raise InputError.one(where, "given", ", ".join(alien), f"leave them out: {read.name} has stages")
     steps = swept(read, sweep) if sweep else None
     count = steps.count if steps else cases.count or RANDOM * (cases.contributors or 1)
     choice = chosen_form(read, made.forms, wanted, count)

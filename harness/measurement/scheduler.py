@@ -186,7 +186,7 @@ def refuse_lost_workers(ended: BaseException) -> None:
     """Raise InputError if a task ended so because workers did: killed, as for their memory, or cut off."""
     distributed = sys.modules.get("distributed")  # there if its workers are used
     if isinstance(ended, CancelledError) or (distributed and isinstance(ended, distributed.KilledWorker)):
-        allowed = "workers that go on: they were killed, as where memory is short, or the scheduler ended. "
+        allowed = "workers that keep running: they were killed, as for memory, or the scheduler ended. "
         allowed += "Take fewer, and run the same command again: what was answered is kept"
         raise InputError.one("--scheduler", "workers", type(ended).__name__, allowed) from ended
 

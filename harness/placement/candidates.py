@@ -72,7 +72,7 @@ class MovableFasteners:
             points = grid(self.bare, *cells).round(DIGITS)
             points, faults, labels = points[self._on_parts(points)], [], []
             if not len(points):
-                allowed = "cells of which a middle is on the parts"
+                allowed = "cells, at least one with its centre on the parts"
                 raise InputError.one("--candidates", "holes", holes, allowed)
         else:
             table = read_columns(Path(holes), ("x", "y"), replace(options, missing=()))

@@ -144,7 +144,7 @@ def place(
     if share is not None and not 0 < share <= 1:
         faults.append(Fault("--share", "share", share, "above 0, at most 1"))
     moving = [law for law in cases.laws(movable.scene) if law.strip().startswith("fasteners.")]
-    faults += [Fault("--random", "key", law, "left out: the fasteners change places") for law in moving]
+    faults += [Fault("--random", "key", law, "leave it out: the fasteners change places") for law in moving]
     if faults:
         raise InputError(faults)
     (newton,) = described([("newton", {})], None, "--solver", reporter)

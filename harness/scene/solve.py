@@ -70,7 +70,7 @@ def solve_into(
 
         stress.refuse_unusable(allow_stress, scene)
     if refine and not is_of_plates(scene):
-        allowed = "left out: the mesh of superelements and of given matrices is not known here"
+        allowed = "leave it out: the mesh of superelements and of given matrices is not known"
         raise InputError.one("--refine", "scene", scene.name, allowed)
     print_unusual(scene, console)
     files = fingerprints(scene.sources)  # now: they may change meanwhile

@@ -36,7 +36,7 @@ from report.document.numbers import beside, proven_to
 from .mesh_error import MeshError
 from .solution import Solution
 
-NONE = "left out: only plates have stresses, and superelements with `stress` and `stress_points`"
+NONE = "leave it out: only plates have stresses, and superelements with `stress` and `stress_points`"
 FACES = ("both faces", "the top", "the bottom")  # 0, 1, -1
 ROWS = 300  # of a recovery matrix, at a time
 

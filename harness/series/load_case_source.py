@@ -129,7 +129,7 @@ class GapCases:
     def of_search(self, scene: JointScene, form: Form) -> LoadCases:
         """The load cases of a search on a scene, whose figures need cases that are drawn independently."""
         if self.contributors is not None:
-            allowed = "left out: the cases of contributors are not independent"
+            allowed = "leave it out: the cases of contributors are not independent"
             raise InputError.one("--contributors", "base points", self.contributors, allowed)
         if self.is_single(scene):
             return Listed((load_case(last_scene(scene), form),))
@@ -151,7 +151,7 @@ class GapCases:
         random, last, law = self.laws(scene), last_scene(scene), (self.mean, self.sd, self.correlation_length)
         keys = {text.partition("=")[0].strip() for text in random}
         faults = [
-            Fault(option, "mm", number, f"left out: {key} is random")
+            Fault(option, "mm", number, f"leave it out: {key} is random")
             for (option, key), number in zip(OF_FIELD.items(), law, strict=True)
             if number is not None and key in keys
         ]

@@ -161,7 +161,7 @@ def shim(
     if allow_stress is not None:
         refuse_unusable(allow_stress, bare)
         if none_told(bare):  # whatever is between the parts
-            allowed = "left out: forces at points act near all elements, so that no stress is told"
+            allowed = "leave it out: forces at points act near all elements, so that no stress can be read"
             raise InputError.one("--allow-stress", "stress, N/mm²", allow_stress, allowed)
     there = patches_of(bare.joint, None if patches is None else str(patches))
     others = [] if patches is None else list(read.effects_of(Shims))
@@ -176,7 +176,7 @@ def shim(
     made = cases.of_search(read, form)
     if allow_stress is not None and isinstance(made, RandomInputs):
         keys = [one.name for one in made.inputs]
-        raise InputError.one("--allow-stress", "random keys", keys, "left out: loads are those of the scene")
+        raise InputError.one("--allow-stress", "random keys", keys, "leave them out: loads are the scene's")
     for sentence in (*read.unusual, *made.notes):
         reporter.say(sentence)
     limits, listed = (allow_force or inf, allow_stress or inf), isinstance(made, MeasuredGaps)
@@ -249,7 +249,7 @@ def _faults(scene: Any, asked: dict[str, Any]) -> list[Fault]:
     if not _has_fasteners(scene):
         faults.append(Fault(where, "effect", "no fasteners", "one that presses the parts together"))
     elif asked["allow_force"] is not None and not _has_fasteners(last_scene(scene)):
-        allowed = f"left out: no fastener acts in the last stage, {scene.stages[-1].name}"
+        allowed = f"leave it out: no fastener acts in the last stage, {scene.stages[-1].name}"
         faults.append(Fault("--allow-force", "force, N", asked["allow_force"], allowed))
     if not scene.joint.pairs:
         faults.append(Fault(where, "contacts", "none", "a contact that a shim can fill"))

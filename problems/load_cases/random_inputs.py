@@ -33,9 +33,9 @@ from .random_gaps import RandomGaps
 from .sweep import MOST_CASES, Key, allowed_keys, changed_effects, faults_of, in_order, keys_of, misplaced
 
 LAW = re.compile(r"(?:(each) |([1-9]\d{0,6}) of )?(.*)", re.DOTALL)
-LOCKED = "left out: the stage that sets it locks the approach that it has reached"
+LOCKED = "leave it out: the stage that sets it locks the approach that it has reached"
 FEW = "N of DISTRIBUTION: it changes K, and a K is kept for each of N values"
-DIVIDED = "left out: its points act or change one by one, not as a pattern"
+DIVIDED = "leave it out: its points act or change one by one, not as a pattern"
 #: Where a distribution is tried; a draw that fails between these ends the series with a message.
 TRIED = np.array([0.0, 1.0, *np.arange(1, 8) / 8])
 
@@ -256,7 +256,7 @@ def inputs_of(
             how = text, frozen, elements, int(levels or 0), name not in loads
             inputs.append(one := Input(key.name, key.effect, key.path, *how))
             if per_element and not elements:
-                faults.append(Fault(where, "each", text, "left out: it has no elements at points"))
+                faults.append(Fault(where, "each", text, "leave it out: it has no elements at points"))
             if key.path == ("approach",) and key.effect in fresh:
                 faults.append(Fault(where, "key", name, LOCKED))
             if one.changes_K and not one.levels:

@@ -27,7 +27,7 @@ def drawn_cases(scene: Scene, form: Form, fasteners: bool = False, **law: Any) -
     Raises InputError if more of the scene is random.
     """
     if isinstance(scene, JointScene) and scene.random:
-        allowed = "left out: a suite draws gaps alone"
+        allowed = "leave it out: a suite draws gaps alone"
         raise InputError.one(f"scene {scene.name}", "random", list(scene.random), allowed)
     gaps = random_gaps(scene, **law, form=form)
     return Stream.of(scene, gaps, form) if fasteners and isinstance(scene, JointScene) else gaps

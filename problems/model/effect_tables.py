@@ -83,7 +83,7 @@ class EffectTable:
             content["points"] = [row[:count] for row in self.rows.rows]
             for k, name in enumerate(self.rows.columns[count:], start=count):
                 if name in content:
-                    allowed = f"left out: {self.rows.path.name} has a column {name}"
+                    allowed = f"leave it out: {self.rows.path.name} has a column {name}"
                     yield from self._located(iter([(name, content[name], allowed)]))
                 column = [row[k] for row in self.rows.rows]
                 content[name] = column[0] if len(set(column)) == 1 else column

@@ -148,7 +148,7 @@ class StagePlan:
                 allowed = f"one that no stage names: a {effect.kind} makes a contact, which stays"
                 yield f"{where}.name", effect.name, allowed
             if setting and isinstance(effect, SpringEffect) and "approach" in effect.model_fields_set:
-                allowed = f"left out: stage {setting[0]} locks the approach that it has reached"
+                allowed = f"leave it out: stage {setting[0]} locks the approach that it has reached"
                 yield f"{where}.approach", effect.approach, allowed
             if setting and effect._stages and not self.counts[number]:
                 allowed = f"a file without a column stage: a {effect.kind} acts as a whole"

@@ -432,7 +432,7 @@ def test_a_limit_on_a_stress_that_no_place_tells_is_refused(
     """Before the search, in which no plan could keep it."""
     monkeypatch.setattr("harness.shimming.shim_run.none_told", lambda _: True)
     told = wrong_usage("shim", strip, *ASKED, "--allow-stress", 50, "--out", tmp_path / "out")
-    assert "left out: forces at points act near all elements" in told
+    assert "leave it out: forces at points act near all elements" in told
 
 
 def test_a_directory_of_another_command_is_refused_before_patches_are_found(

@@ -82,7 +82,7 @@ def test_a_limit_of_force_needs_a_fastener_in_the_last_stage(tmp_path: Path) -> 
     asked = ("--allow-gap", 0.05, "--stock", "0.02", "--allow-force", 500)
     done = harness("shim", tmp_path / "scene.toml", *asked, "--out", tmp_path / "out")
     assert done.exit_code == 2
-    said = "--allow-force: force, N = 500.0: left out: no fastener acts in the last stage, release"
+    said = "--allow-force: force, N = 500.0: leave it out: no fastener acts in the last stage, release"
     assert said in " ".join(done.output.split())
     assert not (tmp_path / "out").exists()
 

@@ -124,7 +124,7 @@ def test_series_and_answers_keep_it_and_place_refuses_it(tmp_path: Path) -> None
             "line 3 = -5.0: must be greater than 0; in N",
         ),
         ('kind = "fasteners"', table().replace("50.0\n", "\n"), "line 3"),
-        ('kind = "fasteners"\npreload = 5', table(), "left out: holes.csv has a column preload"),
+        ('kind = "fasteners"\npreload = 5', table(), "leave it out: holes.csv has a column preload"),
         ('kind = "fasteners"', "x,y\n20,10\n", "preload"),
         *(
             ('kind = "installed_fasteners"', table(heading), "a unit: -, n, kn")

@@ -268,7 +268,7 @@ BAD: list[tuple[list[Tables], Tables, str, str]] = [
     ([{"on": ["clamps"]}], {}, "stage[0].name", "required"),
     ([CLAMP | {"on": "clamps"}], {}, "stage[0].on = 'clamps'", "must be a list"),
     ([CLAMP | {"of": []}], {}, "stage[0].of", "did you mean off?"),
-    ([{"name": "1", "on": ["rivets"]}], {"approach": 0.1}, f"{RIVETED}.approach", "left out"),
+    ([{"name": "1", "on": ["rivets"]}], {"approach": 0.1}, f"{RIVETED}.approach", "leave it out"),
     ([{"name": "1", "on": ["tool"]}], {}, "effect[4] (rigid_tool).name = 'tool'", "makes a contact"),
     ([{"name": "1", "on": ["rivets[0:3]"]}], {}, f"{RIVETED}.name", "or none: 3 is in none"),
     ([CLAMP], {"name": "clamps"}, "effect[2].name = 'clamps'", "effect[1] has it"),
