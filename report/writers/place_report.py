@@ -85,7 +85,8 @@ def _summary(record: dict[str, Any]) -> Table:
         said += f"{100 * record['confidence']:g} % confidence {interval} of all"
         for what, numbers in (("beyond the limit", sample["failing"]), ("not proven", sample["unproven"])):
             if numbers:
-                some = ", ".join(map(str, numbers[:FEW])) + (", …" if len(numbers) > FEW else "")
+                some = ", ".join(map(str, numbers[:FEW]))
+                some += f" and {len(numbers) - FEW} more" if len(numbers) > FEW else ""
                 said += f"; {what} in {out_of(len(numbers), sample['cases'], 'case')}: {some}"
         facts[f"{counted(sample['cases'], 'fresh case')}, round {n}"] = said
     if best is not None:

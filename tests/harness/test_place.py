@@ -43,6 +43,7 @@ from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps, random_gaps
 from problems.reporter import Reporter
 from problems.scene_files import read_scene, scene_of
+from report.writers.place_report import _summary
 
 
 @pytest.fixture(scope="module")
@@ -767,3 +768,12 @@ def test_a_file_that_changes_during_the_search_changes_no_plan(
     assert "preload = 40.0" in (out / f"{name}.toml").read_text()
     record = json.loads((out / f"{command}.json").read_text())
     assert record["inputs"]["strip.toml"] == sha256(strip.read_bytes()).hexdigest()
+
+
+def test_the_cases_that_fail_are_named_up_to_ten() -> None:
+    """A sentence of the sheet, which adds the full stop."""
+    sample = {"fasteners": 3, "kept": 8, "interval": [0.1, 0.7], "failing": [*range(12)], "unproven": []}
+    record = {"best": None, "limit_mm": 0.1, "share": 1.0, "count": None, "stages": [], "candidates": []}
+    record |= {"preload": 1.0, "said": "FAIL", "confidence": 0.95, "samples": [sample | {"cases": 20}]}
+    said = _summary(record).data["value"].iloc[-1]
+    assert said.endswith("in 12 of 20 cases: 0, 1, 2, 3, 4, 5, 6, 7, 8, 9 and 2 more")
