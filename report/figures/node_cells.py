@@ -41,18 +41,19 @@ def cell_edges(nodes: Array) -> Array:
 
 
 def cells_of(nodes: Array) -> list[Array]:
-    """The corners (k, 2) of each node's cell, in their order. nodes : (m, 2) mm."""
-    if (grid := grid_of(nodes)) is not None:
+    """The corners (k, 2) of each node's cell, in their order. nodes : (m, 2) mm, perhaps equal."""
+    distinct, place = np.unique(nodes, axis=0, return_inverse=True)
+    if (grid := grid_of(distinct)) is not None:
         x, y = cell_edges(grid[0]), cell_edges(grid[1])
         row, column = np.divmod(grid[2], len(grid[0]))
         across, up = np.array([[0, 1, 1, 0]]), np.array([[0, 0, 1, 1]])
-        return list(np.stack([x[column[:, None] + across], y[row[:, None] + up]], axis=2))
-    distinct, place = np.unique(nodes, axis=0, return_inverse=True)
-    try:
-        cells = _around(distinct, surface_of(distinct).triangles)
-    except ValueError:  # all on one line
-        side = max(float(np.ptp(nodes, axis=0).max()) / len(nodes), 1.0)
-        cells = list(distinct[:, None] + side * SQUARE)
+        cells = list(np.stack([x[column[:, None] + across], y[row[:, None] + up]], axis=2))
+    else:
+        try:
+            cells = _around(distinct, surface_of(distinct).triangles)
+        except ValueError:  # all on one line
+            side = max(float(np.ptp(nodes, axis=0).max()) / len(nodes), 1.0)
+            cells = list(distinct[:, None] + side * SQUARE)
     return [cells[k] for k in place.ravel()]
 
 

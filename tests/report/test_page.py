@@ -209,7 +209,10 @@ def test_of_many_contacts_every_kth_is_in_the_page(tmp_path: Path, monkeypatch: 
 
 def test_the_cells_of_a_map_meet_half_way_between_the_contacts() -> None:
     nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 40.0)])
-    assert node_cells.cells_of(nodes)[1].tolist() == [[5, 0], [25, 0], [25, 5], [5, 5]]
+    for pairs in (1, 2):  # of parts, whose contacts lie above one another
+        cells = node_cells.cells_of(np.tile(nodes, (pairs, 1)))
+        assert len(cells) == 6 * pairs
+        assert cells[1].tolist() == cells[-5].tolist() == [[5, 0], [25, 0], [25, 5], [5, 5]]
 
 
 def area(cell: np.ndarray) -> float:
