@@ -97,7 +97,7 @@ def map_figure(names: Iterable[str]) -> figure:
             plot.add_layout(ColorBar(color_mapper=colours, name=name, visible=False), "right")
     ring: dict[str, Any] = {"size": 7, "line_color": "#ffffff", "fill_color": "#111111"}
     plot.scatter("x", "y", source={"x": [], "y": []}, name="marks", **ring)
-    lines = [("x, mm", "@x"), ("y, mm", "@y"), ("shown", "@value{0.0000}")]
+    lines = [("x, mm", "@x{0.[00]}"), ("y, mm", "@y{0.[00]}"), ("shown", "@value{0.0000}")]
     lines += [(name, f"@{{{name}}}{{0.0000}}") for name in names]
     plot.add_tools(HoverTool(renderers=[above], tooltips=lines), TapTool(renderers=[above]))
     return plot

@@ -88,8 +88,8 @@ async function gapMap() {
 
 // Shows the renderer and the bar of the field's kind and scale, from and to the values asked for.
 function colour(figure, field) {
-  const shown = `${field.kind} ${at("scale")}`, high = Number(at("high")) || field.high;
-  const asked = Number(at("low")) || field.low, low = at("scale") === "log" && asked <= 0 ? high / 1e4 : asked;
+  const shown = `${field.kind} ${at("scale")}`, end = name => at(name) === "" ? field[name] : Number(at(name));
+  const high = end("high"), low = at("scale") === "log" && end("low") <= 0 ? high / 1e4 : end("low");
   for (const bar of figure.right.filter(each => each.color_mapper)) {
     bar.visible = bar.name === shown;
     figure.renderers.find(each => each.name === bar.name).visible = bar.visible;

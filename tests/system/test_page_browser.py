@@ -16,6 +16,7 @@ from synthetic_results import SIZES, everything, row, write_rows
 from synthetic_results import results as results_of
 from synthetic_series import made as made_series
 
+from report.page.answer_page_data import two_answers_data
 from report.page.page_file import write
 from report.page.run_page_data import run_data
 from report.results.reader import read
@@ -285,6 +286,28 @@ def test_a_map_of_a_series_has_its_worst_case_and_curves(chromium: Any, tmp_path
     worst = read_series(tmp_path).cases.sort_values("max_gap_mm")["case"].iloc[-1]
     chosen(chromium, "field", f"case {worst}, the worst")
     eventually(chromium, f"{about}.includes('case {worst}, the worst, mm')")
+
+
+def test_a_map_has_the_largest_value_at_a_place_and_the_colours_asked_for(
+    chromium: Any, tmp_path: Path
+) -> None:
+    """Contacts lie above one another; a change of 0 ends the colours, as any other does; x to 0.01 mm."""
+    nodes = np.array([(x, y) for _ in range(2) for y in (0.0, 500.0, 900.0) for x in (0.0, 1077.93, 2000.0)])
+    second = np.concatenate([np.arange(9.0), np.arange(9.0)[::-1]]) - 6
+    record = {"scene": "a", "title": "b", "method": "c", "m": 18}
+    record |= {"pairs": [{"pair": ["d", "e"], "start": 0, "stop": 18}]}
+    arrays = [{"contact_nodes": nodes, "gap_before": gap, "gap_after": gap} for gap in (0 * second, second)]
+    answers = [(record, each) for each in arrays]
+    page = write(tmp_path / "index.html", "", two_answers_data(answers, answers))
+    opened(chromium, page, urlencode({"view": "maps", "field": "second − first", "low": 0}))
+    _, tooltip = pointed(chromium, "above", "x", "y", 4)
+    assert "x, mm: 1077.93" in tooltip
+    script = (
+        "const plot = ROOT, shown = plot.renderers.find(each => each.name === 'change linear');"
+        "return [[...shown.data_source.data.value], shown.glyph.fill_color.transform.low]"
+    )
+    shown = chromium.execute_script(script.replace("ROOT", ROOT.format("above")))
+    assert shown == [2 * [2.0, 1.0, 0.0, -1.0, -2.0, -1.0, 0.0, 1.0, 2.0], 0.0]
 
 
 def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:
