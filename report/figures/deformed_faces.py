@@ -14,7 +14,7 @@ from report.results.answer_record import pair_name
 
 from . import style
 from .gap_section import around_worst
-from .junction_maps import Array
+from .node_cells import Array, triangles_of
 
 LINES = 40  # of each face, along either side
 NARROWEST, HEIGHT = 0.4, 0.35  # of the view, to its longer side
@@ -22,15 +22,18 @@ TINY = float(np.finfo(float).tiny)
 
 
 def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure | None:
-    """The second face coloured by the gap to the first, not to scale; None without contacts on an area."""
+    """The second face coloured by the gap to the first, not to scale; bays and holes stay open. None without
+    contacts on an area.
+    """
     if (seen := around_worst(record, arrays)) is None:
         return None
     nodes, gap = seen.nodes, seen.gap
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
-    if np.linalg.matrix_rank(nodes - low) < 2:
+    if (corners := triangles_of(nodes)) is None:
         return None
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
     X, Y = np.meshgrid(*(np.linspace(*ends, LINES) for ends in zip(low, high, strict=True)))
-    triangles = Triangulation(*((nodes - low) / (high - low)).T)
+    x, y = ((nodes - low) / (high - low)).T
+    triangles = Triangulation(x, y, corners)
     grid = (X - low[0]) / (high - low)[0], (Y - low[1]) / (high - low)[1]
     first, between = (
         LinearTriInterpolator(triangles, values)(*grid).filled(np.nan) for values in (seen.first, gap)

@@ -48,13 +48,20 @@ def cells_of(nodes: Array) -> list[Array]:
         row, column = np.divmod(grid[2], len(grid[0]))
         across, up = np.array([[0, 1, 1, 0]]), np.array([[0, 0, 1, 1]])
         cells = list(np.stack([x[column[:, None] + across], y[row[:, None] + up]], axis=2))
+    elif (triangles := triangles_of(distinct)) is not None:
+        cells = _around(distinct, triangles)
     else:
-        try:
-            cells = _around(distinct, surface_of(distinct).triangles)
-        except ValueError:  # all on one line
-            side = max(float(np.ptp(nodes, axis=0).max()) / len(nodes), 1.0)
-            cells = list(distinct[:, None] + side * SQUARE)
+        side = max(float(np.ptp(nodes, axis=0).max()) / len(nodes), 1.0)
+        cells = list(distinct[:, None] + side * SQUARE)
     return [cells[k] for k in place.ravel()]
+
+
+def triangles_of(nodes: Array) -> NDArray[np.intp] | None:
+    """The triangles of the surface through nodes, without its bays and holes; None if all are on one line."""
+    try:
+        return surface_of(nodes).triangles
+    except ValueError:
+        return None
 
 
 def _around(nodes: Array, triangles: NDArray[np.intp]) -> list[Array]:

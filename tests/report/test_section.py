@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from mpl_toolkits.mplot3d import Axes3D
 
 from report.document.blocks import Table, number, word
 from report.document.numbers import (
@@ -112,9 +113,21 @@ def test_the_view_is_of_both_faces(worst: int, moved: float) -> None:
 
 def test_what_has_no_area_is_not_drawn() -> None:
     record, arrays = answer(3)
-    arrays["contact_nodes"] = arrays["contact_nodes"] * [1.0, 0.0]
-    assert deformed_figure(record, arrays) is None
+    for along in ([1.0, 0.0], [0.0, 0.0]):
+        assert deformed_figure(record, arrays | {"contact_nodes": arrays["contact_nodes"] * along}) is None
     assert deformed_figure({"m": 0, "pairs": []}, {}) is None
+
+
+def test_no_face_covers_a_bay(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr(Axes3D, "plot_surface", lambda axes, *surface, **look: drawn.append(surface))
+    nodes = np.array([(x, y) for x in np.arange(21.0) for y in np.arange(11.0) if abs(x - 10) > 4 or y < 4])
+    of, zero = np.arange(len(nodes)), np.zeros(len(nodes))
+    matrix = {"A_data": 1.0 + zero, "A_indices": of, "A_indptr": np.arange(len(nodes) + 1)}
+    arrays = {"x": zero, "gap_after": 1.0 + zero, "contact_nodes": nodes} | matrix
+    deformed_figure({"m": len(nodes), "pairs": [PAIRS[0] | {"stop": len(nodes)}]}, arrays)
+    for X, Y, Z in drawn:
+        np.testing.assert_array_equal(np.isnan(Z), (abs(X - 10) < 5) & (Y > 3))
 
 
 @pytest.fixture
