@@ -9,9 +9,10 @@ colours of our solvers are told apart without markers, also by colour-blind read
 from __future__ import annotations
 
 import math
+import warnings
 import zlib
-from collections.abc import Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -112,9 +113,14 @@ RC: Any = {
 }
 
 
-def applied() -> AbstractContextManager[None]:
-    """The style within a `with` block: importing this module changes no global setting."""
-    return mpl.rc_context(RC)
+@contextmanager
+def applied() -> Iterator[None]:
+    """The style within a `with` block, where a letter that the font lacks is a box without a warning:
+    importing this module changes no global setting.
+    """
+    with mpl.rc_context(RC), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+        yield
 
 
 def figure(height: float) -> Figure:

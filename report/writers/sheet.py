@@ -75,7 +75,8 @@ def write_sheet(path: Path, sheet: Sheet) -> None:
     page.text("How sure it is, and from what", weight="bold")
     for line in sure:
         page.text(line, letters=2 * LETTERS)
-    page.figure.savefig(path, format="pdf", dpi=style.DPI)
+    with style.applied():
+        page.figure.savefig(path, format="pdf", dpi=style.DPI)
 
 
 def exactness(error_mm: Any) -> str:

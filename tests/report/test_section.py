@@ -27,6 +27,7 @@ from report.document.numbers import (
     significant,
     upwards,
 )
+from report.figures import style
 from report.figures.deformed_faces import deformed_figure
 from report.figures.gap_section import section_figure
 from report.page.answer_page_data import headline
@@ -215,6 +216,15 @@ def test_many_input_files_leave_room_for_the_origin(tmp_path: Path, pages: list[
     texts = page.figure.texts
     assert "and 976 more. Scene: here" in " ".join(text.get_text() for text in texts)
     assert min(text.get_position()[1] for text in texts) > 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_letters_that_the_font_lacks_are_boxes_without_a_warning(tmp_path: Path) -> None:
+    write_sheet(tmp_path / "sheet.pdf", sheet.Sheet("翼板", "", "No limit.", [], [], {}))
+    with style.applied():
+        drawing, axes = style.single(1.0)
+        axes.set_title("翼板")
+        drawing.savefig(tmp_path / "gap.png")
 
 
 def test_places_are_rounded_by_the_size_of_the_part_and_a_gap_of_rounding_is_zero() -> None:
