@@ -10,7 +10,9 @@ from textwrap import wrap
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.image import imread
+from matplotlib.textpath import text_to_path
 
 from report.document.blocks import Table, records
 from report.document.escape import plain
@@ -25,7 +27,7 @@ TALLEST, LEAST = 0.5, 0.16  # of a picture
 LETTERS, LETTER, GAP = 125, 0.0072, 0.03  # of a line; width of a letter, and between columns, of the page
 LEAST_LINES = 4  # of each table, before pictures shrink
 SMALL = 7.5  # points, of tables that fit
-MOST_FILES = 24  # that are named
+MOST_FILES, LONGEST = 24, 40  # that are named; letters of a name, its last ones
 DIGITS = 12  # of a hash
 GREY = "#555555"
 FINEST = 1e-6  # mm: a smaller error is said to be this
@@ -51,6 +53,7 @@ class Sheet:
     warnings: list[str] = field(default_factory=list)
 
 
+@style.applied()
 def write_sheet(path: Path, sheet: Sheet) -> None:
     """Write one page; pictures shrink, and tables end earlier, where there is no room."""
     page = _Page()
@@ -58,10 +61,12 @@ def write_sheet(path: Path, sheet: Sheet) -> None:
     page.text(sheet.verdict, size=11, weight="bold", color=COLOURS[sheet.kind], letters=76)
     for sentence in sheet.warnings:
         page.text(f"{sentence}.", color=FAIL)
-    files = [f"{name}, SHA-256 {digits[:DIGITS]}" for name, digits in sheet.inputs.items()]
+    names = (name if len(name) <= LONGEST else f"…{name[-LONGEST:]}" for name in sheet.inputs)
+    pairs = zip(names, sheet.inputs.values(), strict=True)
+    files = [f"{name}, SHA-256 {digits[:DIGITS]}" for name, digits in pairs]
     more = [f"and {len(files) - MOST_FILES} more"] if len(files) > MOST_FILES else []
     inputs = [f"Input files: {'; '.join([*files[:MOST_FILES], *more])}."] if files else []
-    sure = [line for text in (*sheet.sure, *inputs, *sheet.origin) for line in wrap(plain(text), LETTERS)]
+    sure = [line for text in (*sheet.sure, *inputs, *sheet.origin) for line in lines_of(text)]
     tables = [Printed(table) for table in sheet.tables if len(table.data)]
     rows = [table.rows + 3 for table in tables]
     least = [min(count, LEAST_LINES + 3) for count in rows]
@@ -75,8 +80,7 @@ def write_sheet(path: Path, sheet: Sheet) -> None:
     page.text("How sure it is, and from what", weight="bold")
     for line in sure:
         page.text(line, letters=2 * LETTERS)
-    with style.applied():
-        page.figure.savefig(path, format="pdf", dpi=style.DPI)
+    page.figure.savefig(path, format="pdf", dpi=style.DPI)
 
 
 def exactness(error_mm: Any) -> str:
@@ -97,6 +101,15 @@ def origin(record: dict[str, Any]) -> list[str]:
         "Printed": minute(datetime.now(UTC).isoformat()),
     }
     return [". ".join(f"{name}: {text}" for name, text in parts.items() if text) + "."]
+
+
+def lines_of(text: str, letters: int = LETTERS, **look: Any) -> list[str]:
+    """The text in lines of so many letters, or of fewer, wide ones. look : of FontProperties."""
+    lines, font = wrap(plain(text), letters), FontProperties(**{"size": 8.0} | look)
+    width = max(
+        (text_to_path.get_text_width_height_descent(line, font, False)[0] for line in lines), default=0
+    )
+    return lines if width <= WIDTH * PAGE[0] * 72 else lines_of(text, letters - 5, **look)
 
 
 class Printed:
@@ -128,7 +141,7 @@ class _Page:
         self.figure, self.at = Figure(figsize=PAGE), TOP
 
     def text(self, text: str, size: float = 8.0, letters: int = LETTERS, **look: Any) -> None:
-        for line in wrap(plain(text), letters):
+        for line in lines_of(text, letters, size=size, weight=look.get("weight")):
             self.cell(LEFT, line, size=size, **look)
             self.at -= LINE * size / 8.0
 

@@ -209,13 +209,16 @@ def test_a_table_with_many_columns_is_no_wider_than_the_page() -> None:
 
 
 def test_many_input_files_leave_room_for_the_origin(tmp_path: Path, pages: list[Any]) -> None:
-    inputs = {f"scan-{k}.csv": "0123456789abcdef" * 4 for k in range(1000)}
-    content = sheet.Sheet("A joint", "", "No limit.", [], origin({"scene": "here"}), inputs)
+    """Nor do capital letters and digits, which are wide, cut their hashes off."""
+    inputs = {f"{7 * '/SOME/FOLDER'}/WING_{k}.OP4": "0123456789abcdef" * 4 for k in range(1000)}
+    content = sheet.Sheet(9 * "LOWER PANEL ", "", "No limit.", [], origin({"scene": "here"}), inputs)
     write_sheet(tmp_path / "sheet.pdf", content)
     (page,) = pages
     texts = page.figure.texts
     assert "and 976 more. Scene: here" in " ".join(text.get_text() for text in texts)
     assert min(text.get_position()[1] for text in texts) > 0
+    renderer = FigureCanvasAgg(page.figure).get_renderer()
+    assert max(text.get_window_extent(renderer).x1 for text in texts) <= 0.94 * renderer.width
 
 
 @pytest.mark.filterwarnings("error")
