@@ -55,6 +55,13 @@ function split(corners, counts) {
   return Array.from(counts, count => corners.slice(start, start += count));
 }
 
+// The largest value at each place: contacts of two pairs may lie above one another.
+function largestAt({x, y}, values) {
+  const largest = new Map(), place = k => `${x[k]} ${y[k]}`;
+  values.forEach((value, k) => largest.set(place(k), Math.max(value, largest.get(place(k)) ?? -Infinity)));
+  return values.map((_, k) => largest.get(place(k)));
+}
+
 let drawing = 0;
 
 async function gapMap() {
@@ -67,10 +74,7 @@ async function gapMap() {
     Object.entries(packed).map(async ([column, text]) => [column, await unpacked(text)])));
   if (turn !== drawing) return; // another map is asked for by now
   for (const name of ["xs", "ys"]) columns[name] = split(columns[name], columns.corners);
-  // Contacts of two pairs may lie above one another.
-  const largest = new Map(), place = k => `${columns.x[k]} ${columns.y[k]}`;
-  columns.value.forEach((value, k) => largest.set(place(k), Math.max(value, largest.get(place(k)) ?? -Infinity)));
-  columns.value = columns.value.map((_, k) => largest.get(place(k)));
+  columns.value = largestAt(columns, columns.value);
   const above = at("threshold") === "" ? field.limit ?? Infinity : Number(at("threshold"));
   const fail = getComputedStyle(document.documentElement).getPropertyValue("--fail");
   const edge = Array.from(columns.value, value => value > above ? fail : "#00000000");
@@ -97,11 +101,11 @@ function colour(figure, field) {
   }
 }
 
-// The curve of a contact beside those of all.
+// The curve of a contact, of those at its place the largest, beside those of all.
 async function exceedance(map, node, {x, y}) {
-  const figure = await FIGURES.curves, width = map.shares.length;
-  const gaps = (await unpacked(map.exceeded)).slice(node * width, (Number(node) + 1) * width);
-  sourceOf(figure, "contact").data = {x: gaps, y: map.shares};
+  const figure = await FIGURES.curves, gaps = await unpacked(map.exceeded), {shares} = map;
+  const above = shares.map((_, s) => largestAt({x, y}, x.map((_, k) => gaps[k * shares.length + s]))[node]);
+  sourceOf(figure, "contact").data = {x: above, y: shares};
   const place = `x = ${number(x[node], 5)}, y = ${number(y[node], 5)} mm`;
   document.getElementById("about-map").append(` Chosen: ${place}.`);
 }
