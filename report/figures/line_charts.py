@@ -81,6 +81,8 @@ def _unfinished(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any
             at, height = run["active"] + STEP * place * (high - low), 0.97 if in_time else run["time_limit_s"]
             along = axes.get_xaxis_transform() if in_time else axes.transData
             axes.plot([at], [height], mark, color=styles[run["method"]]["color"], transform=along, **HOLLOW)
+    edge, marked = STEP * (high - low), axes.dataLim
+    axes.set_xlim(min(low, marked.x0 - edge), max(high, marked.x1 + edge))  # as wide, of one scene as well
 
 
 def entries(cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> list[Line2D]:

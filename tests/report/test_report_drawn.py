@@ -9,6 +9,8 @@ import pytest
 from synthetic_results import no_answer, results, row, shown, table, write_rows
 
 from report.document.blocks import Figure, Section
+from report.figures import style
+from report.figures.line_charts import against_contacts, styles_of
 from report.sections import random_scenes as drawn_scenes
 from report.writers.suite_report import write
 
@@ -155,3 +157,15 @@ def test_superelements_are_compared_with_the_textbook_with_preparation(tmp_path:
     missed = section_of(tmp_path / "missed", [*rows[:-4], rows[-4] | no_answer("time_limit"), *rows[-3:]])
     lines = table(missed, "drawn-superelements").data.set_index("method")
     assert lines.loc["newton (dual)", "worst_ratio"] == np.inf
+
+
+def test_runs_without_an_answer_leave_the_axis_of_one_scene_as_it_is(tmp_path: Path) -> None:
+    """They stand side by side, not at contacts that are some more."""
+    for active in (52, 10):  # of the answer's scene, or of one with fewer contacts
+        missed = [row(f"4386/{active:04d}", name, **no_answer("crashed")) for name in ("gi", "piqp")]
+        cells = results(tmp_path, [row(), *missed]).cells
+        _, axes = style.single(3.0)
+        against_contacts(axes, cells, styles_of(cells))
+        low, high = axes.get_xlim()
+        assert low < active
+        assert high > 54
