@@ -13,9 +13,11 @@ from problems.errors import InputError
 from problems.input.bounded_types import resolved
 from problems.input.text_files import read_text
 from problems.load_cases.random_gaps import RandomGaps
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import Scene
 from problems.random_scenes import drawn_table
 from problems.scene_files import SCENES, TOML_MIB, assembly_path, read_scene, read_toml, scene_of
+
+from .validate import refuse_wrong_laws
 
 MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes", "stress", "stress_points")  # may be relative paths
@@ -68,15 +70,6 @@ def edited(
 def refuse_unreadable(text: str, path: Path) -> None:
     """Raise InputError, as `validate` does, for the text of a scene that is to be written to a path."""
     refuse_wrong_laws(scene_of(tomllib.loads(text), str(path)))
-
-
-def refuse_wrong_laws(scene: Scene) -> None:
-    """Raise InputError for what is wrong in the table [random] of a scene."""
-    if isinstance(scene, JointScene) and scene.random:
-        from problems.load_cases.random_inputs import inputs_of  # only what a scene calls for
-
-        if faults := inputs_of(scene, scene.random, stiffness=True)[1]:
-            raise InputError(faults)
 
 
 def relative(file: Path, folder: Path) -> str:

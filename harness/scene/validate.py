@@ -14,6 +14,7 @@ from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from harness.verification.rounded_stiffness import estimated_displacements, expected_error
 from problems.build import prepared, same_stiffness
+from problems.errors import InputError
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits
@@ -25,7 +26,6 @@ from problems.model.stage_answers import last_scene, stage_scenes
 from problems.reporter import SILENT, Reporter
 from report.document.numbers import counted
 
-from .scene_file import refuse_wrong_laws
 from .solution import Source, load_scene
 
 
@@ -71,6 +71,15 @@ def validate(scene: Source, *, reporter: Reporter = SILENT) -> Size | None:
     else:
         _matrices(read, console)
     return size
+
+
+def refuse_wrong_laws(scene: Scene) -> None:
+    """Raise InputError for what is wrong in the table [random] of a scene."""
+    if isinstance(scene, JointScene) and scene.random:
+        from problems.load_cases.random_inputs import inputs_of  # only what a scene calls for
+
+        if faults := inputs_of(scene, scene.random, stiffness=True)[1]:
+            raise InputError(faults)
 
 
 def _plates(scene: JointScene, joint: Joint, size: Size, console: Console) -> None:

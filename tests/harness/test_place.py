@@ -683,7 +683,7 @@ def test_cells_of_a_pattern_in_a_bay_have_no_hole(tmp_path: Path) -> None:
     fasteners = {"kind": "fasteners", "preload": 1.0, "points": [[10.0, 10.0]]}
     movable = MovableFasteners.of(scene_from(with_bay(tmp_path), fasteners))
     assert movable.candidates("1x4")[0] == ((12.5, 50.0), (87.5, 50.0))
-    with pytest.raises(InputError, match="a middle is on the parts"):
+    with pytest.raises(InputError, match="its centre on the parts"):
         movable.candidates("1x1")
 
 

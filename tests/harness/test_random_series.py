@@ -143,7 +143,7 @@ def test_what_searches_cannot_draw_is_refused(scene: Path, tmp_path: Path) -> No
     for words, said in (
         (("place", scene, "--count", 1), "the fasteners change places"),
         (("place", scene, "--count", 1, "--random", " fasteners.preload=norm(9, 1)"), "the fasteners change"),
-        ((*shims, "--allow-stress", 100), "loads are those of the scene"),
+        ((*shims, "--allow-stress", 100), "loads are the scene's"),
     ):
         assert said in wrong_usage(*words, "--out", tmp_path / "out")
     drawn = GapCases(random=("pressure.value=norm()",), contributors=2)
