@@ -10,5 +10,6 @@ def docstring(thing: Callable[..., Any]) -> str:
     """The docstring of a function or class, from its source where Python has dropped it."""
     if thing.__doc__:
         return inspect.cleandoc(thing.__doc__)
-    (definition,) = ast.parse(inspect.getsource(thing)).body
-    return ast.get_docstring(definition) or ""  # type: ignore[arg-type]
+    source = inspect.getsource(thing)
+    tree = compile(source, "docstring", "exec", ast.PyCF_ONLY_AST, optimize=0)  # Python 3.14 drops it else
+    return ast.get_docstring(tree.body[0]) or ""  # type: ignore[attr-defined]
